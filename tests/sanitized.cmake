@@ -13,7 +13,7 @@ target_compile_options(trammel_pch_sanitized PRIVATE ${options})
 target_precompile_headers(trammel_pch_sanitized PRIVATE ${trammel_heavy_headers})
 
 set(libraries)
-foreach(room base robot measurement compensate store dds config idl_types idl)
+foreach(room base robot measurement compensate store dds config idl_types idl idl_ros2)
   set(target trammel_${room}_sanitized)
   get_target_property(sources trammel_${room} SOURCES)
   get_target_property(folder trammel_${room} SOURCE_DIR)

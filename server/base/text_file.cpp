@@ -9,6 +9,7 @@
 #include <fstream>
 #include <system_error>
 
+#include "server/base/part_file.h"
 #include "server/base/plain_text.h"
 #include "server/base/unix_time.h"
 
@@ -77,7 +78,7 @@ fs::path target_of(const std::string& path) {
   return fs::is_symlink(path, error) ? fs::weakly_canonical(path, error) : fs::path(path);
 }
 
-fs::path beside(const std::string& path) { return fmt::format("{}.{}.part", target_of(path).string(), ::getpid()); }
+fs::path beside(const std::string& path) { return part_beside(target_of(path)); }
 
 /// A TextFile that is not copied: a text may take tens of megabytes.
 struct FileView {
@@ -138,7 +139,11 @@ Status write_views(const std::vector<FileView>& files) {
 
 }  // namespace
 
-Status write_text_file(const std::string& path, const std::string& text) { return write_views({{path, text}}); }
+Status write_text_file(const std::string& path, const std::string& text) {
+  const Status written = write_views({{path, text}});
+  if (written && !is_written_in_place(path)) remove_leftover_parts(target_of(path));
+  return written;
+}
 
 Status write_text_files(const std::vector<TextFile>& files) {
   std::vector<FileView> views;

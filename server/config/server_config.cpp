@@ -99,7 +99,7 @@ std::vector<HostPort> peers(const YamlMap& map) {
 void read_dds(const YamlMap& map, const std::filesystem::path& folder, DdsOptions& dds) {
   map.only({"domain", "address", "allow_network", "without_security", "security", "port", "peer_ports", "peers",
             "compute_workers", "max_clients", "client_requests", "client_mb", "queued_requests", "queued_mb",
-            "cell_share"});
+            "cell_share", "ros2"});
   map.attempt([&] {
     dds.domain = static_cast<std::uint32_t>(integer_within(map, "domain", static_cast<int>(dds.domain), 0, kMaxDomain));
   });
@@ -117,6 +117,9 @@ void read_dds(const YamlMap& map, const std::filesystem::path& folder, DdsOption
   map.attempt([&] { dds.queued_requests = integer_within(map, "queued_requests", dds.queued_requests, 1, 1000000); });
   map.attempt([&] { dds.queued_mb = integer_within(map, "queued_mb", dds.queued_mb, 80, 65536); });
   map.attempt([&] { dds.cell_share = number_within(map, "cell_share", dds.cell_share, 0.5, 1); });
+  map.attempt([&] { dds.ros2 = map.boolean("ros2", dds.ros2); });
+  if (dds.ros2 && !dds.security.empty())
+    map.refuse("ros2", refused("ROS 2 nodes have no role, so that nobody may let them in beside `security`"));
 }
 
 std::string word_of(const YamlMap& map, const std::string& key, const std::string& otherwise,

@@ -42,6 +42,7 @@ struct DdsOptions {
   ReplicaOptions replica = {};
   RecordOptions record = {};  ///< of predictions and corrections
   double cell_share = 0.5;    ///< of these two, for the requests of one cell
+  bool ros2 = false;          ///< whether ROS 2 nodes are answered, too (idl/ros2.h); not together with `security`
 };
 
 }  // namespace trammel

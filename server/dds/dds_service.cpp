@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "idl/ros2.h"
 #include "idl/transport.h"
 #include "server/base/mutex.h"
 #include "server/dds/codec.h"
@@ -24,6 +25,7 @@
 #include "server/dds/replicas/replica_link.h"
 #include "server/dds/reply_channels.h"
 #include "server/dds/request_endpoint.h"
+#include "server/dds/ros2/ros2_endpoint.h"
 #include "server/dds/service_events.h"
 #include "server/dds/state_topics.h"
 #include "server/dds/status_echo.h"
@@ -281,10 +283,20 @@ class DdsService::Running {
     if (opened) opened = open(wire::ReadModels(), others);
     if (opened) opened = open(wire::ManageModels(), others);
     if (opened) opened = open(wire::ReleaseBatches(), others);
+    if (opened && options_.ros2) opened = open_ros2<wire::Ros2PredictErrors>(predictions_);
+    if (opened && options_.ros2) opened = open_ros2<wire::Ros2CorrectTargets>(corrections_);
     if (!opened) return opened;
     auto old = OldContract::open(options_.server_id, *participant_, core_.subscriber, channels_);
     if (!old) return tl::make_unexpected(old.error());
     old_contract_ = std::move(*old);
+    return {};
+  }
+
+  template <typename Ros>
+  Status open_ros2(Lane& lane) {
+    auto endpoint = open_ros2_endpoint<Ros>(core_, lane, replying_);
+    if (!endpoint) return tl::make_unexpected(endpoint.error());
+    endpoints_.push_back(std::move(*endpoint));
     return {};
   }
 

@@ -50,6 +50,26 @@ class RequestEndpointBase {
   [[nodiscard]] virtual OperationFigures figures() const = 0;
 };
 
+/// What the schedule must know of a request of this participant.
+template <typename Operation, typename Request>
+[[nodiscard]] Ask ask_of(const Trainer& trainer, const Request& request, const std::string& participant) {
+  /// How long a request waits for its turn whose client does not say how long it waits.
+  constexpr std::chrono::milliseconds kPatience{5000};
+  const std::string& cell = request.about().cell();
+  const bool is_served = trainer.cells().contains(cell);
+  Ask ask{participant};
+  if (is_served) ask.cell = turn_of(request, cell);
+  if (is_served) ask.work = work_of(request, cell, Operation::kName);
+  ask.items = items_of(request);
+  ask.bytes = bytes_of_request(request);
+  const auto now = std::chrono::steady_clock::now();
+  const std::chrono::milliseconds deadline(request.header().deadline_ms());
+  ask.start_by = now + (deadline.count() > 0 ? deadline : kPatience);
+  // A change that has begun is worth its end: a repeat gets the outcome.
+  if (deadline.count() > 0 && !happens_once(request)) ask.finish_by = ask.start_by;
+  return ask;
+}
+
 /// One operation and its DDS reader. The DDS listener takes each request out of the reader at once, so that none is
 /// pushed out by others, and queues it or has it answered RESULT_BUSY.
 template <typename Operation>
@@ -85,9 +105,6 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
   }
 
  private:
-  /// How long a request waits for its turn whose client does not say how long it waits.
-  static constexpr std::chrono::milliseconds kPatience{5000};
-
   RequestEndpoint(ServiceCore& core, Lanes lanes, std::string reply_topic)
       : core_(core),
         lanes_(lanes),
@@ -131,26 +148,10 @@ class RequestEndpoint final : public RequestEndpointBase, private wire::dds::Dat
                              std::string(reinterpret_cast<const char*>(writer.entityId.value), writer.entityId.size) +
                              request_id_text(request->header().request_id());
     Lane& lane = happens_once(*request) ? lanes_.changes : lanes_.reads;
-    Ask ask = ask_of(*request, to.participant);
+    Ask ask = ask_of<Operation>(core_.trainer, *request, to.participant);
     const auto call = std::make_shared<Call<Operation>>(context_, std::move(request), to, sent, std::move(expectation));
     if (call->is_answered_for_its_id() || !call->is_first()) return;
     if (const auto shed = lane.submit(call, std::move(ask))) call->shed(*shed);
-  }
-
-  [[nodiscard]] Ask ask_of(const Request& request, const std::string& participant) const {
-    const std::string& cell = request.about().cell();
-    const bool is_served = core_.trainer.cells().contains(cell);
-    Ask ask{participant};
-    if (is_served) ask.cell = turn_of(request, cell);
-    if (is_served) ask.work = work_of(request, cell, Operation::kName);
-    ask.items = items_of(request);
-    ask.bytes = bytes_of_request(request);
-    const auto now = std::chrono::steady_clock::now();
-    const std::chrono::milliseconds deadline(request.header().deadline_ms());
-    ask.start_by = now + (deadline.count() > 0 ? deadline : kPatience);
-    // A change that has begun is worth its end: a repeat gets the outcome.
-    if (deadline.count() > 0 && !happens_once(request)) ask.finish_by = ask.start_by;
-    return ask;
   }
 
   ServiceCore& core_;

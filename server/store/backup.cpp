@@ -11,6 +11,7 @@
 #include <system_error>
 
 #include "server/base/hash.h"
+#include "server/base/part_file.h"
 #include "server/compensate/model_file.h"
 #include "server/store/audit.h"
 #include "server/store/audit_rows.h"
@@ -155,7 +156,8 @@ Status check_is_new(const std::string& path) {
 Result<StoreCopy> back_up_store(const std::string& from, const std::string& to,
                                 const std::function<void(double)>& progress) {
   if (const Status is_new = check_is_new(to); !is_new) return tl::make_unexpected(is_new.error());
-  const std::string part = fmt::format("{}.{}.part", to, ::getpid());
+  remove_leftover_parts(to);
+  const std::string part = part_beside(to).string();
   const Unfinished unfinished(part);
   Result<StoreCopy> copy;
   try {

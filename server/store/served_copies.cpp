@@ -22,6 +22,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kVersionsKept = 3;
 constexpr std::size_t kCellDigits = 32;  // of the hash of its name: a name may hold what a file's may not
 constexpr const char* kEnding = ".json";
+constexpr const char* kPart = ".part";  // of a copy that is being written
 
 /// Of everything in the folder; empty where it cannot be read.
 std::vector<fs::directory_entry> entries_of(const fs::path& folder) {
@@ -30,6 +31,14 @@ std::vector<fs::directory_entry> entries_of(const fs::path& folder) {
   for (fs::directory_iterator at(folder, error); !error && at != fs::directory_iterator(); at.increment(error))
     entries.push_back(*at);
   return entries;
+}
+
+/// Of a server that was killed; nobody else writes copies there.
+void remove_parts(const fs::path& folder) {
+  std::error_code error;
+  for (const fs::directory_entry& entry : entries_of(folder)) {
+    if (entry.path().extension() == kPart) fs::remove(entry.path(), error);
+  }
 }
 
 std::string name_of(std::int64_t activation, int version) {
@@ -137,7 +146,8 @@ Status ServedCopies::keep(const std::string& cell, std::int64_t activation, int 
   std::error_code error;
   const bool is_new = fs::create_directories(where, error);
   const std::string file = where + "/" + name_of(activation, version);
-  const std::string part = file + ".part";
+  const std::string part = file + kPart;
+  remove_parts(where);
   if (auto written = write_part(part, content); !written) return written;
   fs::rename(part, file, error);
   if (error) return failure(ErrorCode::kInternal, "cannot be renamed: {}", error.message()).in(part);

@@ -6,8 +6,10 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <filesystem>
 
+#include "server/base/part_file.h"
 #include "tests/support/refusal.h"
 #include "tests/support/temporary_folder.h"
 
@@ -31,6 +33,26 @@ TEST(TextFile, WhatIsWrittenReadsBackAndReplacesWhatWasThere) {
     EXPECT_EQ(read_text_file(path).value(), text);
   }
   EXPECT_EQ(files_in(folder), 1u) << "something was left beside it";
+}
+
+TEST(TextFile, TheNextWriteClearsWhatAKilledOneLeftOfTheSameFile) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder.file("a.model");
+  const auto left = [&](const std::string& name, std::chrono::minutes ago) {
+    const std::string part = folder.write(name, "half");
+    fs::last_write_time(part, fs::file_time_type::clock::now() - ago);
+    return part;
+  };
+  // No process has such a number; process 1 is always there.
+  const std::string old = left("a.model.4194399.part", std::chrono::minutes(2));
+  const std::vector<std::string> stay = {
+      left("a.model.4194398.part", std::chrono::minutes(0)),  // perhaps of another host
+      left("a.model.1.part", std::chrono::minutes(2)), left("b.model.4194399.part", std::chrono::minutes(2)),
+      left("a.model.notes.part", std::chrono::minutes(2))};
+  ASSERT_TRUE(write_text_file(path, "text"));
+  EXPECT_FALSE(fs::exists(old));
+  for (const std::string& part : stay) EXPECT_TRUE(fs::exists(part)) << part;
+  EXPECT_EQ(leftover_parts(folder.path()).size(), 2u);
 }
 
 TEST(TextFile, AFailedWriteLeavesNothing) {

@@ -59,6 +59,7 @@ TEST_F(ServerConfigTest, WhatShipsSaysTheDefaults) {
   EXPECT_EQ(shipped->dds.queued_requests, minimal.dds.queued_requests);
   EXPECT_EQ(shipped->dds.queued_mb, minimal.dds.queued_mb);
   EXPECT_EQ(shipped->dds.cell_share, minimal.dds.cell_share);
+  EXPECT_FALSE(shipped->dds.ros2);
   EXPECT_EQ(shipped->dds.replica, minimal.dds.replica);
   EXPECT_EQ(shipped->dds.record, minimal.dds.record);
   EXPECT_EQ(shipped->trainer.queue_capacity, minimal.trainer.queue_capacity);
@@ -103,11 +104,18 @@ TEST_F(ServerConfigTest, PagesStayOnThisHostWhateverTheFileSays) {
   EXPECT_FALSE(read_server_config(folder_.write("server.yaml", kMinimal + "http: {port: 80}\n")));
 }
 
+TEST_F(ServerConfigTest, LetsNoNodesInBesideSecurityWhereTheyHaveNoRole) {
+  const auto config =
+      read_server_config(folder_.write("server.yaml", kMinimal + "dds: {ros2: true, security: certificates}\n"));
+  ASSERT_FALSE(config);
+  EXPECT_NE(sentence(config.error()).find("ros2"), std::string::npos) << sentence(config.error());
+}
+
 TEST_F(ServerConfigTest, ReadsEveryKey) {
   const ServerConfig config = read(
       "models_in_memory_mb: 512\n"
       "dds: {domain: 3, address: 127.0.0.2, port: 18000, peer_ports: [18002, 18004], compute_workers: 4, "
-      "max_clients: 7, client_requests: 8, client_mb: 90, queued_requests: 10, queued_mb: 110, cell_share: 0.75}\n"
+      "max_clients: 7, client_requests: 8, client_mb: 90, queued_requests: 10, queued_mb: 110, cell_share: 0.75, ros2: true}\n"
       "trainer: {queue_capacity: 2, max_poses: 300, validation_share: 0.3, accept_ratio: 1.5, seed: 9, memory_mb: 64, "
       "cpu_s: 30}\n"
       "log: {level: debug, file: trammel.log, format: json}\n"
@@ -129,6 +137,7 @@ TEST_F(ServerConfigTest, ReadsEveryKey) {
   EXPECT_EQ(config.dds.queued_requests, 10);
   EXPECT_EQ(config.dds.queued_mb, 110);
   EXPECT_EQ(config.dds.cell_share, 0.75);
+  EXPECT_TRUE(config.dds.ros2);
   EXPECT_EQ(config.trainer.queue_capacity, 2);
   EXPECT_EQ(config.trainer.max_poses, 300);
   EXPECT_EQ(config.trainer.validation_share, 0.3);

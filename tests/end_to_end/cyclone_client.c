@@ -1,11 +1,13 @@
-/* A client built with another maker's DDS from the same IDL. Waits for a server's status, asks it for one prediction
- * and prints both. Usage: cyclone_client DOMAIN CELL [LIMIT_S]. The network is set by CYCLONEDDS_URI. */
+/* A client built with another maker's DDS from the same IDL. Waits for a server's status, asks it for one prediction,
+ * has the nominal pose of these joints corrected, and prints all three. Usage: cyclone_client DOMAIN CELL [LIMIT_S].
+ * The network is set by CYCLONEDDS_URI. */
 #include <dds/dds.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "correct_target.h"
 #include "predict_error.h"
 #include "state.h"
 
@@ -55,6 +57,72 @@ static void* take_one(dds_entity_t participant, dds_entity_t reader) {
   return NULL;
 }
 
+/* Until both endpoints are matched with the server. */
+static int wait_for_server(dds_entity_t participant, dds_entity_t writer, dds_entity_t reader) {
+  dds_publication_matched_status_t there;
+  if (dds_get_publication_matched_status(writer, &there) != DDS_RETCODE_OK) return fail("no match status");
+  if (there.current_count == 0 && !wait_for(participant, writer, DDS_PUBLICATION_MATCHED_STATUS)) {
+    return fail("no server reads requests");
+  }
+  dds_subscription_matched_status_t back;
+  if (dds_get_subscription_matched_status(reader, &back) != DDS_RETCODE_OK) return fail("no match status");
+  if (back.current_count == 0 && !wait_for(participant, reader, DDS_SUBSCRIPTION_MATCHED_STATUS)) {
+    return fail("no server writes replies");
+  }
+  return 0;
+}
+
+/* The header and the context of a request by `writer`. */
+static void begin(trammel_wire_v2_RequestHeader* header, trammel_wire_v2_Context* about, const dds_guid_t* writer,
+                  const char* server, char* cell) {
+  static char empty[1] = "";
+  memcpy(header->request_id.writer_guid, writer->v, sizeof header->request_id.writer_guid);
+  header->request_id.sequence_number = SEQUENCE_NUMBER;
+  strcpy(header->server, server);
+  strcpy(header->reply_partition, PARTITION);
+  strcpy(header->trace_id, "trace-7");
+  header->deadline_ms = 5000;
+  header->contract_version = trammel_wire_v2_CONTRACT_VERSION;
+  about->cell = cell;
+  about->tool = empty;
+  about->payload = empty;
+  about->model = empty;
+}
+
+/* What must be commanded so that the tool lands on `wanted`, on the branch of the joints. */
+static int correct(dds_entity_t participant, dds_entity_t subscriber, const char* server, char* cell,
+                   const trammel_wire_v2_PoseMm* wanted, const trammel_wire_v2_CommandedJoints* near) {
+  const dds_entity_t request_topic =
+      dds_create_topic(participant, &trammel_wire_v2_CorrectTargetRequest_desc, "CorrectTarget_2_Request", NULL, NULL);
+  const dds_entity_t reply_topic =
+      dds_create_topic(participant, &trammel_wire_v2_CorrectTargetReply_desc, "CorrectTarget_2_Reply", NULL, NULL);
+  const dds_entity_t reader = dds_create_reader(subscriber, reply_topic, call_qos(), NULL);
+  const dds_entity_t writer = dds_create_writer(participant, request_topic, call_qos(), NULL);
+  dds_guid_t guid;
+  if (reader < 0 || writer < 0 || dds_get_guid(writer, &guid) != DDS_RETCODE_OK) return fail("no endpoints");
+  if (wait_for_server(participant, writer, reader) != 0) return 1;
+
+  trammel_wire_v2_Target target;
+  memset(&target, 0, sizeof target);
+  target.kind = trammel_wire_v2_TARGET_POSE_NEAR_JOINTS;
+  target.pose = *wanted;
+  target.joints_rad = near->joints_rad;
+  target.approach = near->approach;
+  trammel_wire_v2_CorrectTargetRequest request;
+  memset(&request, 0, sizeof request);
+  begin(&request.header, &request.about, &guid, server, cell);
+  request.targets._maximum = request.targets._length = 1;
+  request.targets._buffer = &target;
+  if (dds_write(writer, &request) != DDS_RETCODE_OK) return fail("cannot write the request");
+  const trammel_wire_v2_CorrectTargetReply* reply = take_one(participant, reader);
+  if (reply == NULL) return fail("no reply");
+  if (reply->corrections._length != 1) return fail("no correction");
+  const trammel_wire_v2_CorrectedTarget* corrected = &reply->corrections._buffer[0];
+  printf("status=%d x_mm=%+.3f before_mm=%.3f after_mm=%.3f\n", (int)corrected->status,
+         corrected->commanded.x_mm - wanted->x_mm, corrected->error_before_mm, corrected->error_after_mm);
+  return 0;
+}
+
 int main(int argc, char** argv) {
   if (argc != 3 && argc != 4) return fail("usage: cyclone_client DOMAIN CELL [LIMIT_S]");
   if (argc == 4) limit = DDS_SECS(atoi(argv[3]));
@@ -88,16 +156,7 @@ int main(int argc, char** argv) {
   if (in_force == NULL) return fail("no ModelStatus");
   printf("cell=%s version=%d\n", in_force->cell, in_force->model.version);
 
-  dds_publication_matched_status_t there;
-  if (dds_get_publication_matched_status(request_writer, &there) != DDS_RETCODE_OK) return fail("no match status");
-  if (there.current_count == 0 && !wait_for(participant, request_writer, DDS_PUBLICATION_MATCHED_STATUS)) {
-    return fail("no server reads requests");
-  }
-  dds_subscription_matched_status_t back;
-  if (dds_get_subscription_matched_status(reply_reader, &back) != DDS_RETCODE_OK) return fail("no match status");
-  if (back.current_count == 0 && !wait_for(participant, reply_reader, DDS_SUBSCRIPTION_MATCHED_STATUS)) {
-    return fail("no server writes replies");
-  }
+  if (wait_for_server(participant, request_writer, reply_reader) != 0) return 1;
 
   double values[6] = {0.1, 0.2, 0.3, 0.4, 0.5, 0.6};
   trammel_wire_v2_CommandedJoints pose;
@@ -105,22 +164,11 @@ int main(int argc, char** argv) {
   pose.joints_rad._maximum = pose.joints_rad._length = 6;
   pose.joints_rad._buffer = values;
   pose.approach.temperature_c = pose.approach.time_s = NAN;
-  char empty[1] = "";
   dds_guid_t guid;
   if (dds_get_guid(request_writer, &guid) != DDS_RETCODE_OK) return fail("the writer has no GUID");
   trammel_wire_v2_PredictErrorRequest request;
   memset(&request, 0, sizeof request);
-  memcpy(request.header.request_id.writer_guid, guid.v, sizeof request.header.request_id.writer_guid);
-  request.header.request_id.sequence_number = SEQUENCE_NUMBER;
-  strcpy(request.header.server, status->server);
-  strcpy(request.header.reply_partition, PARTITION);
-  strcpy(request.header.trace_id, "trace-7");
-  request.header.deadline_ms = 5000;
-  request.header.contract_version = trammel_wire_v2_CONTRACT_VERSION;
-  request.about.cell = argv[2];
-  request.about.tool = empty;
-  request.about.payload = empty;
-  request.about.model = empty;
+  begin(&request.header, &request.about, &guid, status->server, argv[2]);
   request.poses._maximum = 1;
   request.poses._length = 1;
   request.poses._buffer = &pose;
@@ -132,7 +180,10 @@ int main(int argc, char** argv) {
   printf("result=%d id=%lld ours=%d trace=%s model=%s version=%d items=%u\n", (int)reply->header.result,
          (long long)reply->header.related_request_id.sequence_number, is_ours, reply->header.trace_id,
          reply->model.hash, reply->model.version, reply->predictions._length);
-  if (reply->predictions._length == 1) printf("dx_mm=%.6f\n", reply->predictions._buffer[0].dx_mm);
+  if (reply->predictions._length != 1) return fail("no prediction");
+  const trammel_wire_v2_PredictedError* predicted = &reply->predictions._buffer[0];
+  printf("dx_mm=%.6f\n", predicted->dx_mm);
+  const int failed = correct(participant, subscriber, status->server, argv[2], &predicted->nominal, &pose);
   dds_delete(participant);
-  return 0;
+  return failed;
 }

@@ -77,7 +77,7 @@ const std::map<std::string, std::string>& not_typed() {
       {"tests/fuzz/run", "takes minutes; Fuzz.*"},
       {"deploy/check fuzz", "takes minutes; Fuzz.*"},
       {"export P", "belongs to the lines below it"},
-      {"python3 tour.py", "Python.*, deploy/try-packages"},
+      {"python3 /usr/share/doc/python3-trammel/tour.py", "Python.*, deploy/try-packages"},
       {"trammel status --host line-3.works", "needs another host; Security.*"},
       {"trammel doctor --host line-3.works", "needs another host; Security.*"},
       {"trammeld --config server.yaml --check", "needs another host's address; Security.*"},

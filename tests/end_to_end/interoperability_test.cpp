@@ -36,13 +36,14 @@ class Interoperability : public testing::Test {
   DdsService service_{options_, *backend_.trainer, *backend_.store, backend_.registry};
 };
 
-TEST_F(Interoperability, ACycloneDdsClientGetsItsPrediction) {
+TEST_F(Interoperability, ACycloneDdsClientGetsItsPredictionAndItsCorrection) {
   const test::Finished client = run(TRAMMEL_CYCLONE_CLIENT, options_.domain, "20");
   EXPECT_EQ(client.exit_code, 0) << client.err;
   EXPECT_EQ(client.out, fmt::format("server=server-a contract=2 cells=2\n"
                                     "cell=cell-7 version=7\n"
                                     "result=0 id=4711 ours=1 trace=trace-7 model={} version=7 items=1\n"
-                                    "dx_mm=0.700000\n",
+                                    "dx_mm=0.700000\n"
+                                    "status=0 x_mm=-0.700 before_mm=0.700 after_mm=0.000\n",
                                     served_->model.provenance().hash));
   const test::Finished stranger = run(TRAMMEL_CYCLONE_CLIENT, options_.domain + 65, "3");
   EXPECT_EQ(stranger.err, "cyclone_client: no ServiceStatus\n") << "it looked at the same port from another domain";
@@ -57,6 +58,37 @@ TEST_F(Interoperability, AClientOfTheContractBeforeIsToldThatItMustBeUpdated) {
       "predict: result=12 id=4711 contract=2 items=0: the request is of contract 1, this server speaks contract 2: "
       "update the client\n"
       "list: result=12 models=0\n");
+}
+
+/// The same server where ROS 2 nodes are answered, too.
+class Ros2 : public Interoperability {
+ protected:
+  Ros2() { service_.stop(); }
+  void SetUp() override { ASSERT_TRUE(open_.start()); }
+
+  static DdsOptions open_for_nodes(DdsOptions options) {
+    options.ros2 = true;
+    return options;
+  }
+  DdsService open_{open_for_nodes(options_), *backend_.trainer, *backend_.store, backend_.registry};
+};
+
+// The names are those of https://design.ros2.org/articles/topic_and_service_names.html: `rt/` before the topic, and
+// `package::msg::dds_::Name_`.
+TEST_F(Ros2, ANodeGetsItsPredictionAndItsCorrectionUnderTheNamesThatRos2Gives) {
+  const test::Finished node = run(TRAMMEL_ROS2_NODE, options_.domain, "20");
+  EXPECT_EQ(node.exit_code, 0) << node.err;
+  EXPECT_EQ(node.out,
+            "rt/trammel/predict_errors trammel_msgs::msg::dds_::PredictErrors_\n"
+            "rt/trammel/correct_targets trammel_msgs::msg::dds_::CorrectTargets_\n"
+            "id=node-1/1 server=server-a result=0 version=7 dx_m=0.0007000\n"
+            "result=2: joint values: 6, needed 5\n"
+            "id=node-1/3 result=0 status=0 joints=6 x_m=-0.000700 before_m=0.000700 after_m=0.000000\n");
+}
+
+TEST_F(Interoperability, ANodeHearsNothingUnlessTheServerIsToldSo) {
+  const test::Finished node = run(TRAMMEL_ROS2_NODE, options_.domain, "3");
+  EXPECT_EQ(node.err, "ros2_node: nobody subscribes to questions\n");
 }
 
 #endif

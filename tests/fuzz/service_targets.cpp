@@ -10,6 +10,7 @@
 #include "clients/session/convert.h"
 #include "idl/guard/guard.h"
 #include "idl/limits.h"
+#include "idl/ros2.h"
 #include "idl/safe_type.h"
 #include "idl/topics.h"
 #include "server/base/check.h"
@@ -17,6 +18,7 @@
 #include "server/base/text_file.h"
 #include "server/config/server_config.h"
 #include "server/dds/handlers.h"
+#include "server/dds/ros2/translated.h"
 #include "server/simulate/simulate.h"
 #include "tests/dds/backend.h"
 #include "tests/fuzz/target.h"
@@ -171,6 +173,47 @@ std::string ask(std::string_view bytes) {
   return "answered";
 }
 
+/// The answer to the question of a ROS 2 node, as the node gets it.
+template <typename Ros>
+std::string ask_as_node(std::string_view bytes) {
+  wire::ReceivedMessageType<typename Ros::Request> type(wire::kMaxComputeSample,
+                                                        std::make_shared<std::atomic<std::uint64_t>>(0));
+  Payload payload(static_cast<std::uint32_t>(bytes.size()));
+  std::copy(bytes.begin(), bytes.end(), payload.data);
+  payload.length = static_cast<std::uint32_t>(bytes.size());
+  wire::ReceivedMessage<typename Ros::Request::type> message;
+  if (!type.deserialize(&payload, &message)) return "dropped";
+  const ServedCells& cells = service().backend.trainer->cells();
+  const auto request = ros2::asked(message, cells);
+  if (request->fault) return "refused";
+  auto reply = service().handlers.answer(*request);
+  if (!reply) return words_of(reply.error());
+  auto answer = ros2::answered(*reply, cells);
+  static_cast<void>(bytes_of<typename Ros::Reply>(answer));
+  return "answered";
+}
+std::vector<std::string> node_predictions() {
+  wire::ros2::PredictErrors_ question;
+  question.id("node/1");
+  question.cell("cell-7");
+  question.joints(6);
+  question.joints_rad(std::vector<double>(18, 0.1));
+  return {bytes_of<wire::Ros2PredictErrors::Request>(question)};
+}
+std::vector<std::string> node_corrections() {
+  wire::ros2::CorrectTargets_ near, on_branch;
+  near.id("node/2");
+  near.cell("cell-7");
+  near.joints(6);
+  near.joints_rad(std::vector<double>(12, 0.1));
+  on_branch.id("node/3");
+  on_branch.cell("cell-7");
+  on_branch.poses().resize(2);
+  for (auto& pose : on_branch.poses()) pose.orientation().w(1);
+  on_branch.conf({0, 3});
+  return {bytes_of<wire::Ros2CorrectTargets::Request>(near), bytes_of<wire::Ros2CorrectTargets::Request>(on_branch)};
+}
+
 /// In a folder with the cell files that it names.
 std::string read_server_file(std::string_view bytes) {
   static const test::TemporaryFolder folder;
@@ -300,6 +343,8 @@ const std::vector<Target>& targets() {
       {"ask_read_models", ask<wire::ReadModels>, mutate_cdr, read_samples},
       {"ask_manage_models", ask<wire::ManageModels>, mutate_cdr, manage_samples},
       {"ask_release_batches", ask<wire::ReleaseBatches>, mutate_cdr, release_samples},
+      {"node_predict_errors", ask_as_node<wire::Ros2PredictErrors>, mutate_cdr, node_predictions},
+      {"node_correct_targets", ask_as_node<wire::Ros2CorrectTargets>, mutate_cdr, node_corrections},
       {"rtps_packet", guard_packet, mutate_cdr, packets},
       {"findings_json", read_findings, mutate_json},
       {"truth_yaml", read_truth_file, mutate_yaml, truths},

@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
-#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -19,6 +18,7 @@
 #include "clients/cli/terminal/command_tree.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
+#include "server/base/part_file.h"
 #include "server/base/plain_text.h"
 #include "server/store/store_check.h"
 
@@ -179,24 +179,11 @@ Found clock() {
   return {"clock", State::kGood, "synchronised", ""};
 }
 
-/// The process that a file of ours belongs to, `NAME.1234.part`; 0: it is none of ours.
-pid_t owner_of_part(const fs::path& file) {
-  if (file.extension() != ".part") return 0;
-  const std::string number = file.stem().extension().string();
-  const bool digits = number.size() > 1 && std::all_of(number.begin() + 1, number.end(),
-                                                       [](unsigned char c) { return c >= '0' && c <= '9'; });
-  return digits && number.size() < 9 ? static_cast<pid_t>(std::stol(number.substr(1))) : 0;
-}
-
 /// Half-written files of processes that are gone, in the folders that were named.
 Found leftovers(const std::vector<fs::path>& folders) {
   std::vector<std::string> left;
   for (const fs::path& folder : folders) {
-    std::error_code error;
-    for (fs::directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
-      const pid_t owner = owner_of_part(it->path());
-      if (owner > 0 && ::kill(owner, 0) != 0 && errno == ESRCH) left.push_back(shown(it->path().string()));
-    }
+    for (const fs::path& part : leftover_parts(folder)) left.push_back(shown(part.string()));
   }
   std::sort(left.begin(), left.end());
   if (left.empty()) return {"leftovers", State::kGood, "no half-written files of processes that are gone", ""};

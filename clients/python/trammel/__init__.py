@@ -15,7 +15,8 @@ import dataclasses
 import io
 import json
 import os
-from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, Optional, Sequence, Union
+import re
+from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -35,13 +36,47 @@ Path = Union[str, "os.PathLike[str]"]
 Floats = npt.NDArray[np.float64]
 Progress = Callable[[str, float], object]  #: told what is being done and the share done, [0, 1]; may raise to give up
 
+Table = Union[npt.ArrayLike, "pd.DataFrame"]  #: an array, or a pandas frame with the columns of a file
+
 _POSE = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
+_JOINT = re.compile(r"q([0-9]+)_(deg|mm)")
 
 
 def _frame(columns: Mapping[str, Any]) -> "pd.DataFrame":
     import pandas
 
     return pandas.DataFrame(dict(columns))
+
+
+def _floats(values: Any, argument: str) -> Floats:
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise Usage(f"{argument}: {error}") from None
+
+
+def _joint_columns(table: Any) -> List[str]:
+    """`q1_deg ... qn_deg` of a frame, by their numbers; nothing of anything else."""
+    found = [_JOINT.fullmatch(str(name)) for name in getattr(table, "columns", ())]
+    return [joint.group() for joint in sorted((j for j in found if j), key=lambda joint: int(joint.group(1)))]
+
+
+def _joints(table: Table) -> Floats:
+    columns = _joint_columns(table)
+    return _floats(table[columns] if columns else table, "joints_deg")  # type: ignore[index,call-overload]
+
+
+def _targets(pose: Optional[Table], joints_deg: Optional[Table],
+             conf: Optional[npt.ArrayLike]) -> Tuple[Optional[Floats], Optional[Floats], Optional[npt.ArrayLike]]:
+    """Poses, joints and branches as arrays; a frame of targets may hold all three."""
+    frame: Any = pose if hasattr(pose, "columns") else None
+    if frame is not None:
+        if joints_deg is None and _joint_columns(frame):
+            joints_deg = frame
+        if conf is None and joints_deg is None and "conf" in frame.columns:
+            conf = frame["conf"].to_numpy()
+        pose = frame[list(_POSE)] if set(_POSE) <= set(frame.columns) else None
+    return (None if pose is None else _floats(pose, "pose"), None if joints_deg is None else _joints(joints_deg), conf)
 
 
 def _column_by_column(names: Sequence[str], table: Floats) -> Dict[str, Any]:
@@ -276,26 +311,27 @@ class Model:
         """Errors on poses held out from training, else on the training poses, as `evaluate()` returns them."""
         return self._inside.figures()
 
-    def predict(self, joints_deg: npt.ArrayLike, tool: str = "", payload: str = "", directions: Sequence[int] = (),
+    def predict(self, joints_deg: Table, tool: str = "", payload: str = "", directions: Sequence[int] = (),
                 temperature_c: Optional[float] = None) -> Predictions:
-        """The error to expect at `joints_deg` (N, n) or (n,), deg, of rails mm.
+        """The error to expect at `joints_deg` (N, n) or (n,), deg, of rails mm; or a pandas frame with `q1_deg ...`.
 
         `tool`, `payload`: ids of the cell; empty: its only one. `directions`: from which each joint is approached,
         n of -1, 0, +1. Raises `Refused` with the row of a pose beyond the limits.
         """
-        return Predictions(**self._inside.predict(joints_deg, tool, payload, list(directions), temperature_c))
+        return Predictions(**self._inside.predict(_joints(joints_deg), tool, payload, list(directions), temperature_c))
 
-    def correct(self, pose: Optional[npt.ArrayLike] = None, joints_deg: Optional[npt.ArrayLike] = None,
+    def correct(self, pose: Optional[Table] = None, joints_deg: Optional[Table] = None,
                 conf: Optional[npt.ArrayLike] = None, tool: str = "", payload: str = "",
                 directions: Sequence[int] = (), temperature_c: Optional[float] = None) -> Corrections:
         """What to command so that the tool lands on each target.
 
         `pose` (N, 7): X_BT wanted, mm and quaternion. The branch is said by `conf` (N,) or one for all (0..7: +4 wrist
         behind axis 1, +2 behind the lower arm, +1 joint 5 negative) or by `joints_deg` (N, n) near it, deg, of rails mm.
-        Without `pose` the nominal poses at `joints_deg` are wanted. A target that cannot be corrected says so in its
-        status.
+        Without `pose` the nominal poses at `joints_deg` are wanted. `pose` may be a pandas frame with the columns of a file
+        of targets: the pose, joints, `conf`. A target that cannot be corrected says so in its status.
         """
-        return Corrections(**self._inside.correct(pose, joints_deg, conf, tool, payload, list(directions), temperature_c))
+        return Corrections(**self._inside.correct(*_targets(pose, joints_deg, conf), tool, payload, list(directions),
+                                                  temperature_c))
 
     def evaluate(self, batches: Batches) -> Dict[str, Any]:
         """Measured against predicted, with the keys of `trammel evaluate --json`; mm and deg."""
@@ -347,17 +383,18 @@ class Session:
         """The text of a model file, for `Model.parse()`; version 0: in force."""
         return self._inside.export_model(cell, version)
 
-    def predict(self, cell: str, joints_deg: npt.ArrayLike, tool: str = "", payload: str = "",
+    def predict(self, cell: str, joints_deg: Table, tool: str = "", payload: str = "",
                 directions: Sequence[int] = (), temperature_c: Optional[float] = None) -> Predictions:
         """As `Model.predict()`, by the model in force: `joints_deg` (N, n) or (n,), deg, of rails mm."""
-        _, items = self._inside.predict(cell, joints_deg, tool, payload, list(directions), temperature_c)
+        _, items = self._inside.predict(cell, _joints(joints_deg), tool, payload, list(directions), temperature_c)
         return Predictions(**items)
 
-    def correct(self, cell: str, pose: Optional[npt.ArrayLike] = None, joints_deg: Optional[npt.ArrayLike] = None,
+    def correct(self, cell: str, pose: Optional[Table] = None, joints_deg: Optional[Table] = None,
                 conf: Optional[npt.ArrayLike] = None, tool: str = "", payload: str = "",
                 directions: Sequence[int] = (), temperature_c: Optional[float] = None) -> Corrections:
         """As `Model.correct()`, by the model in force: `pose` (N, 7), `joints_deg` (N, n), `conf` (N,)."""
-        _, items = self._inside.correct(cell, pose, joints_deg, conf, tool, payload, list(directions), temperature_c)
+        _, items = self._inside.correct(cell, *_targets(pose, joints_deg, conf), tool, payload, list(directions),
+                                        temperature_c)
         return Corrections(**items)
 
     def submit(self, cell: str, batch: Batch) -> int:

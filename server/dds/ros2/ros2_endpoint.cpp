@@ -1,0 +1,177 @@
+#include "server/dds/ros2/ros2_endpoint.h"
+
+#include <pthread.h>
+
+#include <fastdds/dds/publisher/DataWriterListener.hpp>
+#include <stop_token>
+#include <thread>
+
+#include "idl/ros2.h"
+#include "server/base/bounded_queue.h"
+#include "server/dds/ros2/translated.h"
+
+namespace trammel {
+namespace {
+
+/// Writes answers where all nodes hear them. Thread-safe.
+template <typename Ros>
+class Ros2Replies final : public ReplySink {
+ public:
+  using Reply = typename Ros::Operation::Reply::type;
+  using Message = typename Ros::Reply::type;
+
+  [[nodiscard]] static Result<std::unique_ptr<Ros2Replies>> open(ServiceCore& core, WorkUnderWay& writing) {
+    const auto topic = wire::make_topic(core.participant, Ros::kReplyTopic,
+                                        new wire::SafeType<typename Ros::Reply>(Ros::Operation::kMaxSample));
+    if (!topic) return tl::make_unexpected(topic.error());
+    std::unique_ptr<Ros2Replies> replies(new Ros2Replies(core, writing));
+    replies->publisher_ = core.participant.create_publisher(wire::publisher_qos({}));
+    if (replies->publisher_ != nullptr)
+      replies->writer_ = replies->publisher_->create_datawriter(*topic, wire::call_writer_qos(wire::kReplyDepth));
+    if (replies->writer_ == nullptr)
+      return failure(ErrorCode::kInternal, "cannot create the writer of {}", Ros::kReplyTopic);
+    replies->start();
+    return replies;
+  }
+
+  ~Ros2Replies() override {
+    thread_ = {};
+    if (writer_ != nullptr) publisher_->delete_datawriter(writer_);
+    if (publisher_ != nullptr) core_.participant.delete_publisher(publisher_);
+  }
+  Ros2Replies(const Ros2Replies&) = delete;
+  Ros2Replies& operator=(const Ros2Replies&) = delete;
+
+  void send(const ReplyAddress&, std::shared_ptr<void> reply, std::size_t) override {
+    const WorkUnderWay::Piece piece = writing_.begin();
+    Message message = ros2::answered(*static_cast<const Reply*>(reply.get()), core_.trainer.cells());
+    if (writer_->write(&message)) return;
+    Message error;
+    error.id(message.id());
+    error.server(core_.server_id);
+    error.result(wire::RESULT_INTERNAL);
+    error.message("the answer does not fit on the wire; ask for less of it");
+    writer_->write(&error);
+  }
+
+  /// What has no room is dropped: so many refusals wait only where nodes ask faster than they can be told.
+  void post(const ReplyAddress&, std::shared_ptr<void> reply, std::size_t) override {
+    static_cast<void>(posted_.try_push(std::move(reply)));
+  }
+
+ private:
+  static constexpr std::size_t kPosted = 4096;
+
+  Ros2Replies(ServiceCore& core, WorkUnderWay& writing) : core_(core), writing_(writing), posted_(kPosted) {}
+
+  void start() {
+    thread_ = std::jthread([this](const std::stop_token& stop) {
+      ::pthread_setname_np(::pthread_self(), "ros2 replies");
+      while (auto reply = posted_.pop(stop)) send({}, std::move(*reply), 0);
+    });
+  }
+
+  ServiceCore& core_;
+  WorkUnderWay& writing_;
+  wire::dds::Publisher* publisher_ = nullptr;
+  wire::dds::DataWriter* writer_ = nullptr;
+  BoundedQueue<std::shared_ptr<void>> posted_;
+  std::jthread thread_;
+};
+
+template <typename Ros>
+class Ros2Endpoint final : public RequestEndpointBase, private wire::dds::DataReaderListener {
+ public:
+  using Operation = typename Ros::Operation;
+  using Message = wire::ReceivedMessage<typename Ros::Request::type>;
+
+  [[nodiscard]] static Result<std::unique_ptr<RequestEndpointBase>> open(ServiceCore& core, Lane& lane,
+                                                                         WorkUnderWay& writing) {
+    const auto topic =
+        wire::make_topic(core.participant, Ros::kRequestTopic,
+                         new wire::ReceivedMessageType<typename Ros::Request>(Operation::kMaxSample, core.unreadable));
+    if (!topic) return tl::make_unexpected(topic.error());
+    auto replies = Ros2Replies<Ros>::open(core, writing);
+    if (!replies) return tl::make_unexpected(replies.error());
+    std::unique_ptr<Ros2Endpoint> endpoint(new Ros2Endpoint(core, lane, std::move(*replies)));
+    const auto heard = wire::dds::StatusMask::data_available() << wire::dds::StatusMask::sample_lost();
+    endpoint->reader_ =
+        core.subscriber.create_datareader(*topic, wire::call_reader_qos(wire::kRequestDepth), endpoint.get(), heard);
+    if (endpoint->reader_ == nullptr)
+      return failure(ErrorCode::kInternal, "cannot create the reader of {}", Ros::kRequestTopic);
+    return endpoint;
+  }
+
+  ~Ros2Endpoint() override { close(); }
+
+  void close() override {
+    if (reader_ != nullptr) core_.subscriber.delete_datareader(reader_);
+    reader_ = nullptr;
+  }
+
+  OperationFigures figures() const override {
+    return {Ros::kName, context_.operation.latency(), by_result_words(context_.operation)};
+  }
+
+ private:
+  Ros2Endpoint(ServiceCore& core, Lane& lane, std::unique_ptr<Ros2Replies<Ros>> replies)
+      : core_(core),
+        lane_(lane),
+        replies_(std::move(replies)),
+        context_{core.server_id, Ros::kReplyTopic, core.handlers, *replies_, core.counts} {
+    context_.listener = core.listener;
+    context_.recorder = core.recorder;
+  }
+
+  void on_data_available(wire::dds::DataReader* reader) override {
+    wire::dds::SampleInfo info;
+    Message message;
+    while (take(*reader, message, info)) {
+      if (info.valid_data) receive(message, info.sample_identity.writer_guid());
+    }
+  }
+
+  void on_sample_lost(wire::dds::DataReader*, const wire::dds::SampleLostStatus& status) override {
+    core_.counts.lost += static_cast<std::uint64_t>(status.total_count_change);
+  }
+
+  bool take(wire::dds::DataReader& reader, Message& message, wire::dds::SampleInfo& info) {
+    const WorkUnderWay::Piece piece = core_.taking.begin();
+    return reader.take_next_sample(&message, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
+  }
+
+  /// In the thread that receives all requests: it must not wait, nor write.
+  void receive(const Message& message, const eprosima::fastrtps::rtps::GUID_t& writer) {
+    if (!message.server().empty() && message.server() != core_.server_id) return;
+    auto request = ros2::asked(message, core_.trainer.cells());
+    request->header().request_id().writer_guid(wire::octets_of(writer));
+    const ReplyAddress to{wire::participant_of(writer), {}, context_.reply_topic};
+    const std::string sent = to.participant +
+                             std::string(reinterpret_cast<const char*>(writer.entityId.value), writer.entityId.size) +
+                             message.id();
+    Ask ask = ask_of<Operation>(core_.trainer, *request, to.participant);
+    const auto call = std::make_shared<Call<Operation>>(context_, std::move(request), to, sent, nullptr);
+    if (call->is_answered_for_its_id() || !call->is_first()) return;
+    if (const auto shed = lane_.submit(call, std::move(ask))) call->shed(*shed);
+  }
+
+  ServiceCore& core_;
+  Lane& lane_;
+  const std::unique_ptr<Ros2Replies<Ros>> replies_;
+  CallContext<Operation> context_;
+  wire::dds::DataReader* reader_ = nullptr;
+};
+
+}  // namespace
+
+template <typename Ros>
+Result<std::unique_ptr<RequestEndpointBase>> open_ros2_endpoint(ServiceCore& core, Lane& lane, WorkUnderWay& writing) {
+  return Ros2Endpoint<Ros>::open(core, lane, writing);
+}
+
+template Result<std::unique_ptr<RequestEndpointBase>> open_ros2_endpoint<wire::Ros2PredictErrors>(ServiceCore&, Lane&,
+                                                                                                  WorkUnderWay&);
+template Result<std::unique_ptr<RequestEndpointBase>> open_ros2_endpoint<wire::Ros2CorrectTargets>(ServiceCore&, Lane&,
+                                                                                                   WorkUnderWay&);
+
+}  // namespace trammel
