@@ -127,6 +127,19 @@ std::string batches_of(const StoredJob& job) {
   return job.batch_ids.empty() ? "sent with it" : html_text(fmt::format("{}", fmt::join(job.batch_ids, ", ")));
 }
 
+bool has_findings(const StoredJob& job) { return job.kind != JobKind::kTrain && job.state == JobState::kDone; }
+
+/// `Last check, 2026-11-22: healthy`, with the way to what it found; empty where none was made lately.
+std::string last_of(const std::vector<StoredJob>& jobs, JobKind kind) {
+  const StoredJob* last = nullptr;  // the jobs come oldest first
+  for (const StoredJob& job : jobs)
+    if (job.kind == kind && has_findings(job)) last = &job;
+  if (last == nullptr) return "";
+  const std::string name = fmt::format("Last {}, {} UTC", kind_of(kind), shown_time(last->finished_at));
+  return fmt::format("<p>{}: {}</p>", html_link(job_address(last->id) + "/findings", name),
+                     outcome_of(*last, std::nullopt));
+}
+
 /// Newest first.
 Result<std::string> job_table(const Watched& server, const std::string& cell) {
   const auto jobs = server.store.recent_jobs(cell, kJobs);
@@ -136,10 +149,12 @@ Result<std::string> job_table(const Watched& server, const std::string& cell) {
   std::vector<HtmlRow> rows;
   for (auto job = jobs->rbegin(); job != jobs->rend(); ++job) {
     const auto now = progress_in(running, job->id);
-    rows.push_back({{html_link(job_address(job->id), std::to_string(job->id)),
-                     html_link(cell_address(job->cell), job->cell), kind_of(job->kind), batches_of(*job),
-                     html_time(job->created_at), html_time(job->finished_at), outcome_of(*job, now)},
-                    now ? "now" : ""});
+    rows.push_back(
+        {{html_link(job_address(job->id), std::to_string(job->id)), html_link(cell_address(job->cell), job->cell),
+          kind_of(job->kind), batches_of(*job), html_time(job->created_at), html_time(job->finished_at),
+          outcome_of(*job, now) +
+              (has_findings(*job) ? "<br>" + html_link(job_address(job->id) + "/findings", "what it found") : "")},
+         now ? "now" : ""});
   }
   return table({"job", "cell", "what", "batches", "asked (UTC)", "ended (UTC)", "outcome"}, rows);
 }
@@ -246,10 +261,12 @@ Result<ServicePage> cell_page(const Watched& server, const std::string& cell) {
       now.version == 0
           ? ""
           : html_link(model_address(cell, now.version), fmt::format("Report of version {}", now.version)) + " · ";
+  const std::vector<StoredJob> lately = server.store.recent_jobs(cell, kJobs).value_or(std::vector<StoredJob>());
   std::string body =
       html_section("Now", fmt::format("<p class=\"verdict\">{}: {}</p><p>{}{}</p>",
                                       now.is_dark() ? "Dark" : "Answered for", state_of(now), report,
-                                      html_link(cell_address(cell) + "/history", "History of its parameters")));
+                                      html_link(cell_address(cell) + "/history", "History of its parameters")) +
+                              last_of(lately, JobKind::kCheck) + last_of(lately, JobKind::kDiagnose));
   add_section(&body, "Versions", version_table(server, cell));
   add_section(&body, "Batches that are kept out", quarantine_table(server, cell));
   add_section(&body, "Jobs", job_table(server, cell));

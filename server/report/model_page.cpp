@@ -240,6 +240,15 @@ std::string bias_note(const CompensatedModel::Parts& parts) {
   return " No bias is learned, so calibrated and compensated are the same: " + why + ".";
 }
 
+/// What the three levels are, and why their errors are larger than what is promised.
+std::string reading_note(const CompensatedModel& model) {
+  return fmt::format(
+      " Nominal: the robot as drawn; calibrated: with the parameters that were identified; compensated: with the "
+      "learned bias, too. The instrument's own noise, {:.4f} mm rms as stated, is in these errors; in what is promised "
+      "above it is not.",
+      to_mm(std::sqrt(3.0) * model.cell().tracker.sigma));
+}
+
 std::string learning_text(const std::optional<LearningCurve>& curve) {
   return curve ? "<p>" + html_text(curve->sentence) + "</p>"
                : "<p>Not known: there are too few poses to leave some out, or too many to do it for a page.</p>";
@@ -262,7 +271,7 @@ std::string model_page(const CompensatedModel& model, const std::optional<Measur
                   {"certificate", certificate(model, accuracy, batch)},
                   {"tiles", tiles(compared.evaluation)},
                   {"warnings", warnings(model, compared.evaluation)},
-                  {"compared", html_text(compared.text + bias_note(model.parts()))},
+                  {"compared", html_text(compared.text + bias_note(model.parts()) + reading_note(model))},
                   {"figures", figures_table(compared.evaluation)},
                   {"orientation", orientation_table(compared.evaluation)},
                   {"worst", worst_poses(shown)},

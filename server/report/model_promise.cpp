@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/base/unix_time.h"
 #include "server/measurement/pose_columns.h"
 #include "server/measurement/repeats.h"
 #include "server/report/html.h"
@@ -31,6 +32,16 @@ std::string check_by(const ModelProvenance& provenance) {
   const std::int64_t from = newest_measurement(provenance);
   return from > 0 ? "check again by " + shown_day(from + kFirstCheck * kDay)
                   : "when it was measured is not known, so check before use";
+}
+
+/// Where the day of the next check has passed.
+std::string overdue(const ModelProvenance& provenance) {
+  const std::int64_t from = newest_measurement(provenance), now = unix_now();
+  if (from <= 0 || now <= from + kFirstCheck * kDay) return "";
+  return fmt::format(
+      "<p class=\"warning\">That day had passed when this page was written, on {}: check the robot before you rely on "
+      "it.</p>\n",
+      shown_day(now));
 }
 
 std::string or_not_told(const std::string& text) { return text.empty() ? "not in the cell file" : text; }
@@ -170,8 +181,9 @@ std::string certificate(const CompensatedModel& model, const std::optional<Posit
                         const std::optional<MeasurementBatch>& batch) {
   const std::string papers = papers_table(model, accuracy);
   if (!accuracy) return papers;
+  const std::string late = overdue(model.provenance());
   const std::optional<double> tolerance = rules_of(model.cell()).value_or(CellRules{}).tolerance;
-  return tolerance_sentence(*accuracy, tolerance) + tolerance_table(*accuracy, tolerance) +
+  return late + tolerance_sentence(*accuracy, tolerance) + tolerance_table(*accuracy, tolerance) +
          "\n<p>This holds in the volume and with the tool and payload named below, for targets that <code>trammel "
          "correct</code> has corrected; of each it says whether it is inside that volume and what error to expect. "
          "Not in it: how well the part is located, forces of the process, wear of the tool, and a robot that has "

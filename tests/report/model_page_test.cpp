@@ -8,6 +8,7 @@
 #include <numeric>
 #include <sstream>
 
+#include "server/base/unix_time.h"
 #include "server/measurement/checked_batch.h"
 #include "server/report/model_poses.h"
 #include "server/report/model_promise.h"
@@ -155,6 +156,14 @@ TEST_F(ModelPage, BeginsWithHowGoodItIsWhereAndUntilWhen) {
   const std::string page = model_page(model, std::nullopt);
   EXPECT_TRUE(has(page, "<p id=\"promise\">" + promise));
   EXPECT_LT(page.find(promise), page.find("<table"));
+}
+
+TEST_F(ModelPage, SaysThatTheDayOfTheNextCheckHasPassedWhereItHas) {
+  EXPECT_TRUE(has(model_page(trained_on(cell_with(""), batch_), std::nullopt), "That day had passed"));
+  CompensatedModel::Parts parts = trained_on(cell_with(""), batch_).parts();
+  parts.provenance.trained_at = unix_now();
+  parts.provenance.measured_at = unix_now();
+  EXPECT_FALSE(has(model_page(CompensatedModel::make(parts).value(), std::nullopt), "That day had passed"));
 }
 
 TEST(RoundedUp, IsNeverSmallerThanTheLength) {

@@ -33,7 +33,7 @@ tr.left td { background: #fbe6da; } tr.out_of_domain td { background: #fff6e0; }
   .targets td:nth-child(7)::before { content: "before, mm "; } .targets td:nth-child(8)::before { content: "after, mm "; }
   .targets td:nth-child(9)::before { content: "sigma, mm "; } .targets td:nth-child(10)::before { content: "rounding, mm "; }
 }
-@media print { tr { break-inside: avoid; } #path { height: 20rem; break-inside: avoid; } .targets { font-size: 8px; } .targets td:nth-child(n) { white-space: normal; } }
+@media print { tr { break-inside: avoid; } #path { height: 16rem; break-inside: avoid; } .targets { font-size: 8px; } .targets td:nth-child(n) { white-space: normal; } }
 </style>
 </head>
 <body>
