@@ -29,14 +29,20 @@ constexpr std::chrono::minutes kLimit{2};
 const fs::path kPictures = TRAMMEL_BINARY_DIR "/tests/screenshots";
 
 /// Of a page: what stands out of its window, what is drawn on each canvas, where its links lead. A canvas that holds
-/// fewer coloured points than text would is empty.
+/// few coloured points, or all of them in a corner, as axes stand, is empty.
 constexpr const char* kLook = R"(
   const coloured = canvas => {
     const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
-    let count = 0;
-    for (let i = 0; i < pixels.length; i += 4)
-      if (pixels[i + 3] > 100 && Math.max(...pixels.slice(i, i + 3)) - Math.min(...pixels.slice(i, i + 3)) > 45) ++count;
-    return count;
+    let count = 0, left = 1, right = 0, top = 1, bottom = 0;
+    for (let i = 0; i < pixels.length; i += 4) {
+      if (pixels[i + 3] <= 100) continue;
+      const r = pixels[i], g = pixels[i + 1], b = pixels[i + 2];
+      if (Math.max(r, g, b) - Math.min(r, g, b) <= 45) continue;
+      const x = i / 4 % canvas.width / canvas.width, y = Math.floor(i / 4 / canvas.width) / canvas.height;
+      left = Math.min(left, x); right = Math.max(right, x); top = Math.min(top, y); bottom = Math.max(bottom, y);
+      ++count;
+    }
+    return Math.max(right - left, bottom - top) > 0.4 ? count : 0;
   };
   const root = document.documentElement;
   const scrolls = e => e.scrollWidth > e.clientWidth + 1 && getComputedStyle(e).overflowX !== "visible" && e.clientWidth > 0;
@@ -48,7 +54,7 @@ constexpr const char* kLook = R"(
     text: document.body.innerText
   };)";
 
-/// `# comment` lines of a shell that makes every page that the command line writes.
+/// What a shell types to make every page that the command line writes.
 constexpr const char* kRun = R"(
 set -euo pipefail
 measured() { trammel simulate --cell cell.yaml --truth "$TRUTH" --plan "$1" --seed "$2" -o "$3"; }
