@@ -190,6 +190,14 @@ bool is_placeholder(const StatedLoad& load) {
 Result<std::vector<ToolChoice>> choose_tools(const Program& program, const std::vector<ToolUse>& uses,
                                              const CellTools& cell, const std::string& tool,
                                              const std::string& payload) {
+  if (!tool.empty() && !cell.tools.contains(tool)) {
+    std::vector<std::string> known;
+    for (const auto& [name, X_FT] : cell.tools) known.push_back(name);
+    return failure(ErrorCode::kUsage, "the cell has no tool '{}'", shown(tool))
+        .of("--tool")
+        .with_text(tool)
+        .next(fmt::format("it has: {}", fmt::join(known, ", ")));
+  }
   return Choosing(program, cell, tool, payload).choose(uses);
 }
 

@@ -7,6 +7,7 @@
 #include "clients/cli/terminal/command_tree.h"
 #include "clients/cli/terminal/defaults.h"
 #include "clients/cli/terminal/output.h"
+#include "clients/cli/terminal/spared_inputs.h"
 #include "clients/cli/terminal/usage.h"
 #include "clients/cli/text/help_topics.h"
 #include "server/base/plain_text.h"
@@ -125,9 +126,11 @@ int run_command_line(int argc, const char* const* argv) {
     fmt::print(stderr, "A command is required\n{}", app.help());
     return kWrongUsage;
   }
+  const CLI::App& command = *app.get_subcommands().front();
+  if (const Status spared = check_inputs_are_spared(command); !spared)
+    return tell_errors(advised(spared.error(), command), command.get_name(), words);
   const Result<Extent> done = chosen();
   if (done) return *done == Extent::kAll ? 0 : kNotAll;
-  const CLI::App& command = *app.get_subcommands().front();
   return tell_errors(advised(done.error(), command), command.get_name(), words);
 }
 

@@ -94,6 +94,13 @@ std::optional<long> line_of(const YAML::Mark& mark) {
   return mark.line + 1;
 }
 
+bool is_indented_by_tab(const std::string& text, const YAML::Mark& mark) {
+  std::istringstream lines(text);
+  std::string line;
+  for (int k = 0; k <= mark.line && std::getline(lines, line);) ++k;
+  return line.substr(0, line.find_first_not_of(" \t")).find('\t') != std::string::npos;
+}
+
 std::string column_text(const YAML::Mark& mark) {
   return mark.is_null() ? std::string() : fmt::format("column {}: ", mark.column + 1);
 }

@@ -79,6 +79,8 @@ class YamlMap {
 [[nodiscard]] std::optional<long> line_of(const YAML::Mark& mark);
 /// `column 5: `, counted from 1; empty if the parser does not know it.
 [[nodiscard]] std::string column_text(const YAML::Mark& mark);
+/// Whether the line of the mark begins with a tab among its blanks.
+[[nodiscard]] bool is_indented_by_tab(const std::string& text, const YAML::Mark& mark);
 
 /// Parses `text` and hands its top mapping to `read`; turns refusals and parser errors into one Error that holds all.
 template <typename Read>
@@ -96,6 +98,7 @@ auto read_yaml(const std::string& text, const std::string& where, Read&& read)
   } catch (const YAML::Exception& error) {
     Failure damaged = refused("{}not YAML: {}", column_text(error.mark), error.msg).in(where);
     damaged.value().row = line_of(error.mark);
+    if (is_indented_by_tab(text, error.mark)) damaged.value().next = "indent with blanks: YAML takes no tabs";
     return damaged;
   }
 }

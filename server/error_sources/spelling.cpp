@@ -116,7 +116,7 @@ Result<ErrorSourcePtr> make_error_source(const std::string& given, const Cell& c
     return failure(ErrorCode::kUsage, "unknown error source '{}'{}", spec, did_you_mean(cause_in(spec), names))
         .of("error_sources")
         .with_text(spec)
-        .next(fmt::format("known: {}", fmt::join(names, ", ")));
+        .next(fmt::format("levels are M0 to M3, more sources are joined by commas; known: {}", fmt::join(names, ", ")));
   }
   if (const auto forms = alternatives(spec, cell); forms.front() != spec) return make_error_source(forms.front(), cell);
   const auto form = std::find_if(known->forms.begin(), known->forms.end(),

@@ -12,6 +12,7 @@
 #include "server/report/history.h"
 #include "server/report/html.h"
 #include "server/report/model_page.h"
+#include "server/report/page_parts.h"
 
 namespace trammel {
 namespace {
@@ -22,30 +23,13 @@ constexpr std::size_t kHistoryVersions = 10;  // whose parameters are read
 constexpr std::size_t kEvents = 30;
 constexpr int kJobs = 20;  // of those done, and of those failed
 
-struct Row {
-  std::vector<std::string> cells;  ///< HTML
-  std::string kind = {};           ///< class for the style sheet; empty: none
-};
-
 std::string html_time(std::optional<std::int64_t> unix_s) { return "<time>" + shown_time(unix_s) + "</time>"; }
 
 /// Text that may be broken anywhere, as hashes are.
 std::string breakable(const std::string& text) { return "<span class=\"breaks\">" + html_text(text) + "</span>"; }
 
-/// A table; on narrow screens each cell stands on a line of its own, behind the name of its column.
-std::string table(const std::vector<std::string>& head, const std::vector<Row>& rows) {
-  std::string html = "<div class=\"wide\"><table>\n<thead>" + html_head(head) + "</thead>\n<tbody>\n";
-  for (const Row& row : rows) {
-    html += row.kind.empty() ? "<tr>" : fmt::format("<tr class=\"{}\">", row.kind);
-    for (std::size_t i = 0; i < row.cells.size(); ++i)
-      html += fmt::format("<td title=\"{}\">{}</td>", i < head.size() ? html_text(head[i]) : "", row.cells[i]);
-    html += "</tr>\n";
-  }
-  return html + "</tbody></table></div>";
-}
-
-std::string section(const std::string& title, const std::string& body) {
-  return fmt::format("<section>\n<h2>{}</h2>\n{}\n</section>\n", html_text(title), body);
+std::string table(const std::vector<std::string>& head, std::vector<HtmlRow> rows) {
+  return "<div class=\"wide\">" + html_table({"stacks", head, std::move(rows)}) + "</div>";
 }
 
 /// `not_better` as two words.
@@ -85,7 +69,7 @@ std::string troubles_of(const Watched& server) {
   if (troubles.empty()) return "";
   std::string list;
   for (const std::string& one : troubles) list += "<li>" + html_text(one) + "</li>";
-  return section("What is wrong now", "<ul>" + list + "</ul>");
+  return html_section("What is wrong now", "<ul>" + list + "</ul>");
 }
 
 using InMemory = std::map<std::string, ServedModelPtr>;
@@ -99,8 +83,8 @@ InMemory in_memory(const Watched& server) {
   return models;
 }
 
-Row fleet_row(const CellReadiness& one, const InMemory& models, std::int64_t now) {
-  Row row{{html_link(cell_address(one.cell), one.cell), state_of(one)}, one.is_dark() ? "dark" : "served"};
+HtmlRow fleet_row(const CellReadiness& one, const InMemory& models, std::int64_t now) {
+  HtmlRow row{{html_link(cell_address(one.cell), one.cell), state_of(one)}, one.is_dark() ? "dark" : "served"};
   const auto found = models.find(one.cell);
   const ServedModel* model = found == models.end() ? nullptr : found->second.get();
   const int version = model == nullptr ? one.version : model->version;
@@ -121,7 +105,8 @@ std::string outcome_of(const StoredJob& job, const std::optional<JobProgress>& n
   if (now && now->stage == JobStage::kQueued) return now->what.empty() ? "waits" : "waits: " + html_text(now->what);
   if (now) return fmt::format("{}, {:.0f} %", html_text(now->what), 100 * now->share);
   const std::string verdict = apart_words(to_text(job.outcome.verdict));
-  const std::string& why = job.outcome.why.empty() ? job.message : job.outcome.why;
+  const std::string why = with_micro(job.outcome.why.empty() ? job.message : job.outcome.why);
+  if (job.kind != JobKind::kTrain && !why.empty()) return html_text(why);
   return html_text(why.empty() ? verdict : verdict + ": " + why);
 }
 
@@ -142,19 +127,34 @@ std::string batches_of(const StoredJob& job) {
   return job.batch_ids.empty() ? "sent with it" : html_text(fmt::format("{}", fmt::join(job.batch_ids, ", ")));
 }
 
+bool has_findings(const StoredJob& job) { return job.kind != JobKind::kTrain && job.state == JobState::kDone; }
+
+/// `Last check, 2026-11-22: healthy`, with the way to what it found; empty where none was made lately.
+std::string last_of(const std::vector<StoredJob>& jobs, JobKind kind) {
+  const StoredJob* last = nullptr;  // the jobs come oldest first
+  for (const StoredJob& job : jobs)
+    if (job.kind == kind && has_findings(job)) last = &job;
+  if (last == nullptr) return "";
+  const std::string name = fmt::format("Last {}, {} UTC", kind_of(kind), shown_time(last->finished_at));
+  return fmt::format("<p>{}: {}</p>", html_link(job_address(last->id) + "/findings", name),
+                     outcome_of(*last, std::nullopt));
+}
+
 /// Newest first.
 Result<std::string> job_table(const Watched& server, const std::string& cell) {
   const auto jobs = server.store.recent_jobs(cell, kJobs);
   if (!jobs) return tl::make_unexpected(jobs.error());
   if (jobs->empty()) return std::string("<p>None.</p>");
   const Unfinished running = unfinished(server);
-  std::vector<Row> rows;
+  std::vector<HtmlRow> rows;
   for (auto job = jobs->rbegin(); job != jobs->rend(); ++job) {
     const auto now = progress_in(running, job->id);
-    rows.push_back({{html_link(job_address(job->id), std::to_string(job->id)),
-                     html_link(cell_address(job->cell), job->cell), kind_of(job->kind), batches_of(*job),
-                     html_time(job->created_at), html_time(job->finished_at), outcome_of(*job, now)},
-                    now ? "now" : ""});
+    rows.push_back(
+        {{html_link(job_address(job->id), std::to_string(job->id)), html_link(cell_address(job->cell), job->cell),
+          kind_of(job->kind), batches_of(*job), html_time(job->created_at), html_time(job->finished_at),
+          outcome_of(*job, now) +
+              (has_findings(*job) ? "<br>" + html_link(job_address(job->id) + "/findings", "what it found") : "")},
+         now ? "now" : ""});
   }
   return table({"job", "cell", "what", "batches", "asked (UTC)", "ended (UTC)", "outcome"}, rows);
 }
@@ -164,7 +164,7 @@ Result<std::string> version_table(const Watched& server, const std::string& cell
   if (!versions) return tl::make_unexpected(versions.error());
   if (versions->empty()) return std::string("<p>None yet.</p>");
   const int in_force = server.registry.version_in_force(cell);
-  std::vector<Row> rows;
+  std::vector<HtmlRow> rows;
   for (auto one = versions->rbegin(); one != versions->rend() && rows.size() < kMostVersions; ++one) {
     const bool now = one->version == in_force;
     rows.push_back(
@@ -180,7 +180,7 @@ Result<std::string> version_table(const Watched& server, const std::string& cell
 Result<std::string> quarantine_table(const Watched& server, const std::string& cell) {
   const auto batches = server.trainer.quarantined(cell);
   if (!batches) return tl::make_unexpected(batches.error());
-  std::vector<Row> rows;
+  std::vector<HtmlRow> rows;
   for (const StoredBatch& batch : *batches)
     rows.push_back({{html_text(batch.id), std::to_string(batch.poses), html_time(batch.accepted_at),
                      html_text(batch.quarantine)}});
@@ -188,7 +188,7 @@ Result<std::string> quarantine_table(const Watched& server, const std::string& c
 }
 
 std::string event_table(const AuditTrail& trail) {
-  std::vector<Row> rows;
+  std::vector<HtmlRow> rows;
   for (auto row = trail.rows.rbegin(); row != trail.rows.rend(); ++row)
     rows.push_back({{html_time(row->at), html_text(row->what), html_text(row->subject),
                      breakable(row->before + (row->after.empty() ? "" : " → " + row->after)), html_text(row->why),
@@ -202,7 +202,7 @@ std::string event_table(const AuditTrail& trail) {
 /// A section, or why there is none.
 void add_section(std::string* body, const std::string& title, const Result<std::string>& html) {
   if (html && html->empty()) return;
-  *body += section(title, html ? *html : "<p>Cannot be read: " + html_text(sentence(html.error())) + "</p>");
+  *body += html_section(title, html ? *html : "<p>Cannot be read: " + html_text(sentence(html.error())) + "</p>");
 }
 
 CellReadiness readiness_of(const Watched& server, const std::string& cell) {
@@ -229,12 +229,13 @@ ServicePage fleet_page(const Watched& server) {
   const std::vector<CellReadiness> cells = cells_readiness(server);
   const InMemory models = in_memory(server);
   const auto dark = std::count_if(cells.begin(), cells.end(), [](const auto& one) { return one.is_dark(); });
-  std::vector<Row> rows;
+  std::vector<HtmlRow> rows;
   for (const CellReadiness& one : cells) rows.push_back(fleet_row(one, models, unix_now()));
-  const std::string verdict =
-      dark == 0 ? cells.size() == 1 ? "Its cell is answered for."
-                                    : fmt::format("All {} cells are answered for.", cells.size())
-                : fmt::format("{} of {} cells are dark: nobody gets an answer for them.", dark, cells.size());
+  const std::string verdict = dark == 0
+                                  ? cells.size() == 1 ? "Its cell is answered for."
+                                                      : fmt::format("All {} cells are answered for.", cells.size())
+                                  : fmt::format("{} of {} cells {} dark: nobody gets an answer for {}.", dark,
+                                                cells.size(), dark == 1 ? "is" : "are", dark == 1 ? "it" : "them");
   const Movement movement = server.movement();
   const std::string still =
       movement.still.empty()
@@ -242,13 +243,14 @@ ServicePage fleet_page(const Watched& server) {
           : fmt::format("<p>No progress in: {}</p>", html_text(fmt::format("{}", fmt::join(movement.still, ", "))));
   const auto running = server.trainer.unfinished_jobs().size();
   const std::string body =
-      section("Now", fmt::format("<p class=\"verdict\">{}</p>{}<p>{}: {} wait or run.</p><p class=\"note\">{} {}, read "
-                                 "again every {} s.</p>",
-                                 verdict, still, html_link("/jobs", "Jobs"), running, html_text(server.server_id),
-                                 html_text(server.program_version), kLiveAgain)) +
+      html_section("Now",
+                   fmt::format("<p class=\"verdict\">{}</p>{}<p>{}: {} wait or run.</p><p class=\"note\">{} {}, read "
+                               "again every {} s.</p>",
+                               verdict, still, html_link("/jobs", "Jobs"), running, html_text(server.server_id),
+                               html_text(server.program_version), kLiveAgain)) +
       troubles_of(server) +
-      section("Cells",
-              table({"cell", "state", "version", "trained (UTC)", "age of its data", "held-out rms, mm"}, rows));
+      html_section("Cells",
+                   table({"cell", "state", "version", "trained (UTC)", "age of its data", "held-out rms, mm"}, rows));
   return {"Cells of " + server.server_id, body, kLiveAgain};
 }
 
@@ -259,10 +261,12 @@ Result<ServicePage> cell_page(const Watched& server, const std::string& cell) {
       now.version == 0
           ? ""
           : html_link(model_address(cell, now.version), fmt::format("Report of version {}", now.version)) + " · ";
+  const std::vector<StoredJob> lately = server.store.recent_jobs(cell, kJobs).value_or(std::vector<StoredJob>());
   std::string body =
-      section("Now", fmt::format("<p class=\"verdict\">{}: {}</p><p>{}{}</p>", now.is_dark() ? "Dark" : "Answered for",
-                                 state_of(now), report,
-                                 html_link(cell_address(cell) + "/history", "History of its parameters")));
+      html_section("Now", fmt::format("<p class=\"verdict\">{}: {}</p><p>{}{}</p>",
+                                      now.is_dark() ? "Dark" : "Answered for", state_of(now), report,
+                                      html_link(cell_address(cell) + "/history", "History of its parameters")) +
+                              last_of(lately, JobKind::kCheck) + last_of(lately, JobKind::kDiagnose));
   add_section(&body, "Versions", version_table(server, cell));
   add_section(&body, "Batches that are kept out", quarantine_table(server, cell));
   add_section(&body, "Jobs", job_table(server, cell));
@@ -273,20 +277,20 @@ Result<ServicePage> cell_page(const Watched& server, const std::string& cell) {
 Result<ServicePage> jobs_page(const Watched& server) {
   const auto jobs = job_table(server, "");
   if (!jobs) return tl::make_unexpected(jobs.error());
-  return ServicePage{"Jobs", section("Newest first", *jobs), kLiveAgain};
+  return ServicePage{"Jobs", html_section("Newest first", *jobs), kLiveAgain};
 }
 
 Result<ServicePage> job_page(const Watched& server, std::int64_t id) {
   const auto job = server.store.job(id);
   if (!job) return tl::make_unexpected(job.error());
   const auto now = progress_in(unfinished(server), id);
-  std::vector<Row> rows = {{{"cell", html_link(cell_address(job->cell), job->cell)}},
-                           {{"what", kind_of(job->kind)}},
-                           {{"batches", batches_of(*job)}},
-                           {{"asked (UTC)", html_time(job->created_at)}},
-                           {{"begun (UTC)", html_time(job->started_at)}},
-                           {{"ended (UTC)", html_time(job->finished_at)}},
-                           {{"outcome", outcome_of(*job, now)}}};
+  std::vector<HtmlRow> rows = {{{"cell", html_link(cell_address(job->cell), job->cell)}},
+                               {{"what", kind_of(job->kind)}},
+                               {{"batches", batches_of(*job)}},
+                               {{"asked (UTC)", html_time(job->created_at)}},
+                               {{"begun (UTC)", html_time(job->started_at)}},
+                               {{"ended (UTC)", html_time(job->finished_at)}},
+                               {{"outcome", outcome_of(*job, now)}}};
   const JobOutcome& outcome = job->outcome;
   if (outcome.before || outcome.after)
     rows.push_back({{"held-out rms, mm", fmt::format("before {}, after {}, limit {}", millimetres(outcome.before),
@@ -297,7 +301,8 @@ Result<ServicePage> job_page(const Watched& server, std::int64_t id) {
                                         fmt::format("version {}", job->model_version))}});
   if (job->kind != JobKind::kTrain && !now)
     rows.push_back({{"found", html_link(job_address(id) + "/findings", "what it found")}});
-  return ServicePage{fmt::format("Job {}", id), section("What became of it", table({}, rows)), now ? kLiveAgain : 0};
+  return ServicePage{fmt::format("Job {}", id), html_section("What became of it", html_table({"", {}, rows})),
+                     now ? kLiveAgain : 0};
 }
 
 Result<std::string> model_report(const Watched& server, const std::string& cell, int version) {

@@ -21,18 +21,11 @@ constexpr std::string_view kStyle = R"(
   :root { --good: #007a59; --dark: #b23c00; }
   h1 { margin-bottom: 16px; }
   .wide { overflow-x: auto; }
-  a { color: var(--mark); }
   td { overflow-wrap: break-word; } time { white-space: nowrap; } .breaks { overflow-wrap: anywhere; }
   .now td { font-weight: 600; }
   .dark td:first-child { border-left: 4px solid var(--dark); padding-left: 8px; }
   .served td:first-child { border-left: 4px solid var(--good); padding-left: 8px; }
-  .verdict { font-size: 17px; margin: 0 0 8px; }
-  @media screen and (max-width: 760px) {
-    table, tbody, tr, td { display: block; } thead { display: none; } td { overflow-wrap: anywhere; }
-    tr { padding: 8px 0; border-bottom: 1px solid var(--line); } td { border: 0; padding: 1px 0 1px 8px; }
-    td[title]:not([title=""]):not(:empty)::before { content: attr(title) ": "; color: var(--soft); font-weight: 400; }
-  }
-  @media print { nav { display: none; } td { min-width: 11ch; } .wide { overflow: visible; } a { color: inherit; text-decoration: none; } }
+  @media print { nav { display: none; } td { min-width: 11ch; } .wide { overflow: visible; } }
 )";
 
 constexpr std::string_view kWayBackStyle = R"(
@@ -103,10 +96,6 @@ HttpReply stored_page_reply(const std::string& page, const std::string& cell) {
   PageInserts own = inserts_of(page);
   own.styles.emplace_back(kWayBackStyle);
   return html_reply(200, with_way_back(page, cell), content_policy(own) + "; sandbox allow-scripts");
-}
-
-std::string html_link(const std::string& address, const std::string& text) {
-  return fmt::format("<a href=\"{}\">{}</a>", html_text(address), html_text(text));
 }
 
 std::string cell_address(const std::string& cell) {

@@ -22,8 +22,6 @@ struct ServicePage {
 /// everything else.
 [[nodiscard]] HttpReply stored_page_reply(const std::string& page, const std::string& cell);
 
-/// A link; `text` is shown as it stands.
-[[nodiscard]] std::string html_link(const std::string& address, const std::string& text);
 /// The page of a cell, whatever its name is.
 [[nodiscard]] std::string cell_address(const std::string& cell);
 

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <charconv>
 
-#include "server/http/check_page.h"
 #include "server/http/live_pages.h"
 #include "server/http/page_shell.h"
+#include "server/report/health_page.h"
 #include "server/report/html.h"
 
 namespace trammel {
@@ -36,6 +36,16 @@ std::optional<Number> number_in(const std::string& word) {
   return number;
 }
 
+/// What a check found, with the way to its cell and its job.
+HttpReply health_reply(const std::string& findings, const StoredJob& job) {
+  const std::string links = fmt::format(
+      "<p>{} · {} · {} · {} · checked {} UTC</p>", html_link(cell_address(job.cell), "Cell " + job.cell),
+      html_link(cell_address(job.cell) + "/history", "History"),
+      html_link(fmt::format("/jobs/{}", job.id), fmt::format("Job {}", job.id)),
+      html_link(fmt::format("/jobs/{}/findings.json", job.id), "all of it as JSON"), shown_time(job.finished_at));
+  return page_reply({"Health of cell " + job.cell, health_sections(findings, links)});
+}
+
 /// What a diagnosis or a check found: a page, or as programs read it.
 HttpReply findings_reply(const Watched& server, std::int64_t job, bool for_programs) {
   const auto asked = server.store.job(job);
@@ -43,7 +53,7 @@ HttpReply findings_reply(const Watched& server, std::int64_t job, bool for_progr
   const auto found = server.trainer.diagnosis(job);
   if (!found) return refused_reply(found.error());
   if (!for_programs && !found->page.empty()) return stored_page_reply(found->page, asked->cell);
-  if (!for_programs && asked->kind == JobKind::kCheck) return page_reply(check_page(found->findings, asked->cell, job));
+  if (!for_programs && asked->kind == JobKind::kCheck) return health_reply(found->findings, *asked);
   return {200, "application/json", found->findings};
 }
 

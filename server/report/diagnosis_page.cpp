@@ -11,7 +11,9 @@
 #include "server/report/embedded.h"
 #include "server/report/html.h"
 #include "server/report/page_parts.h"
+#include "server/report/pages_beside.h"
 #include "server/report/shown_value.h"
+#include "server/robot/cell_papers.h"
 
 namespace trammel {
 
@@ -124,7 +126,7 @@ std::string tiles(const Diagnosis& diagnosis) {
          tile("after", fmt::format("{:.4f} mm", to_mm(after.rms)), "with what was found") +
          tile("noise", fmt::format("{:.4f} mm", to_mm(std::sqrt(3.0) * diagnosis.noise)),
               html_text("noise, rms: what is left of a position when all that was found is corrected (" +
-                        diagnosis.noise_from + ")")
+                        with_micro(diagnosis.noise_from) + ")")
                   .c_str());
 }
 
@@ -174,7 +176,7 @@ std::string not_separable_text(const Diagnosis& diagnosis) {
     rows.push_back({{html_text(all_in_words(group.causes)), fmt::format("{:.3f}", group.correlation)}});
   }
   if (rows.empty()) return "<p>These poses tell all causes apart that they show.</p>\n";
-  return table({"confusion", {"look the same at these poses", "canonical correlation"}, rows});
+  return table({"confusion stacks", {"look the same at these poses", "canonical correlation"}, rows});
 }
 
 JointType type_of(const Cell& cell, Eigen::Index joint) { return cell.robot.joint(static_cast<int>(joint)).type; }
@@ -240,7 +242,7 @@ std::string needs_table(const char* heading, const std::vector<Unseen>& unseen) 
   for (const Need& need : needs_of(unseen)) {
     rows.push_back({{html_text(kind_in_words(need.one->cause)), html_text(need.joints), html_text(need.one->needs)}});
   }
-  return fmt::format("<h3>{}</h3>\n", heading) + table({"never", {"cause", "joint", "it needs"}, rows});
+  return fmt::format("<h3>{}</h3>\n", heading) + table({"never stacks", {"cause", "joint", "it needs"}, rows});
 }
 
 std::string never_tables(const Diagnosis& diagnosis) {
@@ -268,7 +270,9 @@ std::string smallest_table(std::vector<Unseen> unseen) {
   std::vector<HtmlRow> rows;
   std::transform(unseen.begin(), unseen.end(), std::back_inserter(rows), smallest_row);
   return "<div class=\"screen\"><h3>Would have shown from this size on</h3>\n<div class=\"tall\">" +
-         table({"unseen", {"cause", "joint", "noticed, µm rms", "named, µm rms", "its own share", "it needs"}, rows}) +
+         table({"unseen stacks",
+                {"cause", "joint", "noticed, µm rms", "named, µm rms", "its own share", "it needs"},
+                rows}) +
          "</div></div>\n";
 }
 
@@ -285,7 +289,7 @@ std::string suspects_text(const Diagnosis& diagnosis) {
     rows.push_back({{html_text(pose.pose_id), fmt::format("{}", pose.row), fmt::format("{:.3g}", pose.distance * 1e6),
                      html_text(pose.reason)}});
   }
-  return table({"suspects", {"pose", "row", "off by, µm", "why"}, rows});
+  return table({"suspects stacks", {"pose", "row", "off by, µm", "why"}, rows});
 }
 
 std::string provenance_rows(const Diagnosis& diagnosis, const Cell& cell) {
@@ -295,6 +299,11 @@ std::string provenance_rows(const Diagnosis& diagnosis, const Cell& cell) {
   };
   add("cell", cell.name);
   add("robot", cell.robot.name());
+  const CellPapers papers = papers_of(cell).value_or(CellPapers());
+  for (const auto& [name, text] :
+       {std::pair("serial number", papers.serial_number), std::pair("instrument", papers.instrument),
+        std::pair("operator", papers.operator_name)})
+    if (!text.empty()) add(name, text);
   add("cell hash (SHA-256)", diagnosis.cell_hash);
   add("batch", diagnosis.batch.id);
   add("batch hash (SHA-256)", diagnosis.batch_hash);
@@ -316,11 +325,12 @@ std::string measured_on(const Diagnosis& diagnosis) {
 std::string diagnosis_page(const Diagnosis& diagnosis, const Cell& cell) {
   return fill_in(embedded::diagnosis_page_html,
                  {{"page_css", std::string(page_style())},
+                  {"mark", page_mark({"diagnosis", cell.name})},
                   {"title", html_text(fmt::format("Cell {}: what batch {} says", cell.name, diagnosis.batch.id))},
                   {"subtitle", html_text(fmt::format("{} · {} poses{}", cell.robot.name(), diagnosis.poses,
                                                      measured_on(diagnosis)))},
                   {"verdict", std::string(to_string(diagnosis.verdict))},
-                  {"sentence", html_text(diagnosis.sentence)},
+                  {"sentence", html_text(with_micro(diagnosis.sentence))},
                   {"tiles", tiles(diagnosis)},
                   {"findings", findings_text(diagnosis)},
                   {"unexplained", unexplained_text(diagnosis)},

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "server/compensate/compensated_model.h"
+#include "server/robot/cell_papers.h"
 
 namespace trammel {
 
@@ -29,8 +30,9 @@ struct VersionOnRecord {
   bool in_force = false;
   std::vector<ParameterOnRecord> parameters = {};  ///< none where its file is not there any more
   std::vector<std::string> notes = {};             ///< what it knows to have changed, and what its user should know
+  CellPapers papers = {};                          ///< of its cell file
 };
-/// Its parameters and notes, from the model itself.
+/// Its parameters, notes and papers, from the model itself.
 void put_on_record(const CompensatedModel& model, VersionOnRecord& version);
 
 /// A training, and how its model did on poses held out.

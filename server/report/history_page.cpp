@@ -9,6 +9,8 @@
 #include "server/report/history.h"
 #include "server/report/html.h"
 #include "server/report/page_parts.h"
+#include "server/report/pages_beside.h"
+#include "server/report/plain_page.h"
 #include "server/report/shown_value.h"
 
 namespace trammel {
@@ -114,7 +116,8 @@ std::string parameter_table(const CellHistory& history, const std::vector<Moved>
                            : "unknown"});
   }
   if (rows.empty()) return "<p>No version has any.</p>";
-  return html_table({"parameters", {"parameter", "first", "now", "unit", "over the versions, ± U (k = 2)"}, rows});
+  return html_table(
+      {"parameters flows", {"parameter", "first", "now", "unit", "over the versions, ± U (k = 2)"}, rows});
 }
 
 std::string version_table(const CellHistory& history) {
@@ -124,7 +127,7 @@ std::string version_table(const CellHistory& history) {
                      html_text(one.batches), std::to_string(one.poses), millimetres(one.validation_rms)},
                     one.in_force ? "now" : ""});
   }
-  return html_table({"versions", {"version", "trained (UTC)", "batches", "poses", "held-out rms, mm"}, rows});
+  return html_table({"versions stacks", {"version", "trained (UTC)", "batches", "poses", "held-out rms, mm"}, rows});
 }
 
 std::string outcome_of(const TrainingOnRecord& one) {
@@ -140,7 +143,7 @@ std::string training_table(const CellHistory& history) {
     rows.push_back({{day_of(one.at), html_text(one.batches), millimetres(one.before), millimetres(one.after),
                      html_text(outcome_of(one))}});
   }
-  return html_table({"trainings", {"ended (UTC)", "batches", "before, mm", "after, mm", "outcome"}, rows});
+  return html_table({"trainings stacks", {"ended (UTC)", "batches", "before, mm", "after, mm", "outcome"}, rows});
 }
 
 std::string event_table(const CellHistory& history) {
@@ -150,7 +153,7 @@ std::string event_table(const CellHistory& history) {
     rows.push_back(
         {{day_of(one.at), html_text(one.what), html_text(one.subject), html_text(one.why), html_text(one.who)}});
   }
-  return html_table({"events", {"when (UTC)", "what", "of what", "why", "who"}, rows});
+  return html_table({"events stacks", {"when (UTC)", "what", "of what", "why", "who"}, rows});
 }
 
 std::string verdict(const CellHistory& history, const std::vector<Moved>& moved) {
@@ -180,8 +183,8 @@ std::string verdict(const CellHistory& history, const std::vector<Moved>& moved)
 std::string span_of(const CellHistory& history) {
   if (history.versions.empty()) return "No version on record.";
   const VersionOnRecord &first = history.versions.front(), &last = history.versions.back();
-  return fmt::format("Versions {} to {}, trained from {} to {} UTC", first.version, last.version,
-                     day_of(first.trained_at), day_of(last.trained_at));
+  return fmt::format("Versions {} to {}, trained from {} to {} UTC{}", first.version, last.version,
+                     day_of(first.trained_at), day_of(last.trained_at), papers_text(last.papers));
 }
 
 }  // namespace
@@ -191,7 +194,8 @@ std::string history_page(const CellHistory& history) {
   const std::string title = "History of cell " + html_text(history.cell);
   return fill_in(embedded::history_page_html, {{"page_css", std::string(page_style())},
                                                {"title", title},
-                                               {"span", span_of(history)},
+                                               {"span", html_text(span_of(history))},
+                                               {"mark", page_mark({"history", history.cell})},
                                                {"verdict", verdict(history, moved)},
                                                {"versions", version_table(history)},
                                                {"trainings", training_table(history)},

@@ -28,6 +28,34 @@ std::string escaped(char c) {
 
 std::string class_of(const std::string& kind) { return kind.empty() ? "" : fmt::format(" class=\"{}\"", kind); }
 
+/// The names of columns that cells are shown behind on narrow pages; empty: none.
+std::vector<std::string> names_shown(const HtmlTable& table) {
+  const auto is = [&](const char* kind) { return table.kind.find(kind) != std::string::npos; };
+  if (!is("stacks") && !is("flows")) return {};
+  std::vector<std::string> names = table.head;
+  if (is("flows")) names.front().clear();  // the heading of its row
+  return names;
+}
+
+std::string name_of(const std::vector<std::string>& names, std::size_t column, bool spans) {
+  const bool named = column < names.size() && !spans && !names[column].empty();
+  return named ? fmt::format(" data-name=\"{}\"", names[column]) : "";
+}
+
+std::string rows_of(const std::vector<HtmlRow>& rows, const std::vector<std::string>& names) {
+  std::string html;
+  for (const HtmlRow& row : rows) {
+    html += fmt::format("<tr{}>", class_of(row.kind));
+    for (std::size_t k = 0; k < row.cells.size(); ++k) {
+      const bool spans = row.last_spans > 1 && k + 1 == row.cells.size();
+      html += fmt::format("<td{}{}>{}</td>", name_of(names, k, spans),
+                          spans ? fmt::format(" colspan=\"{}\"", row.last_spans) : "", row.cells[k]);
+    }
+    html += "</tr>\n";
+  }
+  return html;
+}
+
 }  // namespace
 
 std::string html_text(std::string_view text) {
@@ -36,26 +64,20 @@ std::string html_text(std::string_view text) {
   return html;
 }
 
-std::string html_rows(const std::vector<HtmlRow>& rows) {
-  std::string html;
-  for (const HtmlRow& row : rows) {
-    html += fmt::format("<tr{}>", class_of(row.kind));
-    for (std::size_t k = 0; k < row.cells.size(); ++k) {
-      const bool spans = row.last_spans > 1 && k + 1 == row.cells.size();
-      html += fmt::format("<td{}>{}</td>", spans ? fmt::format(" colspan=\"{}\"", row.last_spans) : "", row.cells[k]);
-    }
-    html += "</tr>\n";
-  }
-  return html;
-}
-
-std::string html_head(const std::vector<std::string>& names) {
-  return fmt::format("<tr><th>{}</th></tr>\n", fmt::join(names, "</th><th>"));
-}
+std::string html_rows(const std::vector<HtmlRow>& rows) { return rows_of(rows, {}); }
 
 std::string html_table(const HtmlTable& table) {
-  return fmt::format("<table{}>\n{}{}</table>", class_of(table.kind), table.head.empty() ? "" : html_head(table.head),
-                     html_rows(table.rows));
+  if (table.head.empty()) return fmt::format("<table{}>\n{}</table>", class_of(table.kind), html_rows(table.rows));
+  return fmt::format("<table{}>\n<thead><tr><th>{}</th></tr></thead>\n<tbody>\n{}</tbody></table>",
+                     class_of(table.kind), fmt::join(table.head, "</th><th>"), rows_of(table.rows, names_shown(table)));
+}
+
+std::string html_section(std::string_view title, std::string_view body) {
+  return fmt::format("<section>\n<h2>{}</h2>\n{}\n</section>\n", html_text(title), body);
+}
+
+std::string html_link(std::string_view address, std::string_view text) {
+  return fmt::format("<a href=\"{}\">{}</a>", html_text(address), html_text(text));
 }
 
 std::string script_json(const nlohmann::ordered_json& data) {

@@ -19,15 +19,19 @@ struct HtmlRow {
   int last_spans = 1;     ///< columns that the last cell takes
 };
 [[nodiscard]] std::string html_rows(const std::vector<HtmlRow>& rows);
-/// The row of names above a table.
-[[nodiscard]] std::string html_head(const std::vector<std::string>& names);
 
+/// With `stacks` in its kind each cell stands on a line of its own on narrow screens, behind the name of its column;
+/// with `flows` they follow each other like words. A table of another kind stays one.
 struct HtmlTable {
-  std::string kind = {};          ///< class for the style sheet; empty: none
+  std::string kind = {};          ///< classes for the style sheet; empty: none
   std::vector<std::string> head;  ///< empty: no row of names
   std::vector<HtmlRow> rows;
 };
 [[nodiscard]] std::string html_table(const HtmlTable& table);
+/// A section with a heading; `body` is HTML.
+[[nodiscard]] std::string html_section(std::string_view title, std::string_view body);
+/// A link; `text` is shown as it stands.
+[[nodiscard]] std::string html_link(std::string_view address, std::string_view text);
 
 /// JSON inside a script of a page: no text in it can end the script.
 [[nodiscard]] std::string script_json(const nlohmann::ordered_json& data);

@@ -18,6 +18,7 @@
 #include "server/report/model_promise.h"
 #include "server/report/model_scene.h"
 #include "server/report/page_parts.h"
+#include "server/report/pages_beside.h"
 #include "server/report/session_changes_json.h"
 
 namespace trammel {
@@ -95,19 +96,23 @@ std::string warnings(const CompensatedModel& model, const Evaluation& evaluation
 
 std::string figures_table(const Evaluation& evaluation) {
   if (evaluation.poses == 0) return "";
-  std::vector<HtmlRow> rows;
+  std::vector<HtmlRow> rows, axes;
   for (const auto& [level, figures] : levels_of(evaluation)) {
     std::vector<std::string> cells = {level};
     for (const double value : {figures->rms, figures->mean, figures->p997, figures->max}) {
       cells.push_back(fmt::format("{:.4f}", to_mm(value)));
     }
-    for (int k = 0; k < 3; ++k) {
-      cells.push_back(fmt::format("{:.4f} ± {:.4f}", to_mm(figures->axis_mean(k)), to_mm(figures->axis_stddev(k))));
-    }
     rows.push_back({cells});
+    std::vector<std::string> along = {level};
+    for (int k = 0; k < 3; ++k)
+      along.push_back(fmt::format("{:.4f} ± {:.4f}", to_mm(figures->axis_mean(k)), to_mm(figures->axis_stddev(k))));
+    axes.push_back({along});
   }
-  return html_head({"mm", "rms", "mean", "99.7 %", "max", "x mean ± std", "y mean ± std", "z mean ± std"}) +
-         html_rows(rows);
+  return html_table({"figures", {"length of the error, mm", "rms", "mean", "99.7 %", "largest"}, rows}) + "\n" +
+         html_table({"figures axes flows",
+                     {"along the base's axes, mm", "x: mean ± std", "y: mean ± std", "z: mean ± std"},
+                     axes}) +
+         "\n";
 }
 
 std::string orientation_table(const Evaluation& evaluation) {
@@ -116,13 +121,13 @@ std::string orientation_table(const Evaluation& evaluation) {
   const auto degrees = [](double angle) { return fmt::format("{:.4f}", to_deg(angle)); };
   std::vector<std::string> names = {fmt::format("orientation, deg rms of {} poses", turned.poses), "nominal",
                                     "calibrated", "compensated"};
-  std::vector<std::string> cells = {"angle between measured and predicted", degrees(turned.nominal),
+  std::vector<std::string> cells = {"angle between measured and predicted, deg", degrees(turned.nominal),
                                     degrees(turned.calibrated), degrees(turned.compensated)};
   if (turned.coverage_95) {
     names.emplace_back("inside their 95 % interval");
     cells.push_back(fmt::format("{:.1f} %", 100 * *turned.coverage_95));
   }
-  return html_table({"figures orientation", names, {{cells}}}) + "\n";
+  return html_table({"figures orientation flows", names, {{cells}}}) + "\n";
 }
 
 std::string date_of(std::int64_t unix_time) {
@@ -228,6 +233,22 @@ ordered_json chart_data(const CompensatedModel& model, const Evaluation& evaluat
   return data;
 }
 
+/// What stands for the compensated level where nothing was learned.
+std::string bias_note(const CompensatedModel::Parts& parts) {
+  if (parts.bias) return "";
+  const std::string why = parts.bias_choice ? parts.bias_choice->sentence : "the cell asks for none";
+  return " No bias is learned, so calibrated and compensated are the same: " + why + ".";
+}
+
+/// What the three levels are, and why their errors are larger than what is promised.
+std::string reading_note(const CompensatedModel& model) {
+  return fmt::format(
+      " Nominal: the robot as drawn; calibrated: with the parameters that were identified; compensated: with the "
+      "learned bias, too. The instrument's own noise, {:.4f} mm rms as stated, is in these errors; in what is promised "
+      "above it is not.",
+      to_mm(std::sqrt(3.0) * model.cell().tracker.sigma));
+}
+
 std::string learning_text(const std::optional<LearningCurve>& curve) {
   return curve ? "<p>" + html_text(curve->sentence) + "</p>"
                : "<p>Not known: there are too few poses to leave some out, or too many to do it for a page.</p>";
@@ -243,13 +264,14 @@ std::string model_page(const CompensatedModel& model, const std::optional<Measur
   const std::string title = html_text(fmt::format("Cell {}: model {}", model.cell().name, model.provenance().id));
   return fill_in(embedded::model_page_html,
                  {{"title", title},
+                  {"mark", page_mark({"model", model.cell().name, model.provenance().id})},
                   {"subtitle", html_text(fmt::format("{} · {}", model.cell().robot.name(),
                                                      date_of(model.provenance().trained_at)))},
                   {"promise", html_text(promise_sentence(model, accuracy))},
                   {"certificate", certificate(model, accuracy, batch)},
                   {"tiles", tiles(compared.evaluation)},
                   {"warnings", warnings(model, compared.evaluation)},
-                  {"compared", html_text(compared.text)},
+                  {"compared", html_text(compared.text + bias_note(model.parts()) + reading_note(model))},
                   {"figures", figures_table(compared.evaluation)},
                   {"orientation", orientation_table(compared.evaluation)},
                   {"worst", worst_poses(shown)},

@@ -71,7 +71,8 @@ std::string parameter_table(const CompensatedModel& model) {
     for (std::size_t k = 0; k < source->parameters().size(); ++k)
       rows.push_back(parameter_row(model, *source, parts.parameters[next++]));
   }
-  return html_table({"parameters", {"parameter", "nominal", "correction", "result", "U (k = 2)", "unit", ""}, rows}) +
+  return html_table(
+             {"parameters flows", {"parameter", "nominal", "correction", "result", "± U (k = 2)", "unit", ""}, rows}) +
          "\n";
 }
 

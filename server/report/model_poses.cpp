@@ -227,8 +227,9 @@ std::string worst_poses(const ShownPoses& shown) {
                      fmt::format("{:.1f}", size / std::max(pose->stddev.norm(), 1e-12)),
                      pose->in_domain ? "" : "outside the domain"}});
   }
-  return html_table(
-      {"poses", {"pose", "nominal, mm", "calibrated, mm", "compensated, mm", "over what is stated", ""}, rows});
+  return html_table({"poses flows",
+                     {"pose", "nominal, mm", "calibrated, mm", "compensated, mm", "times its stated deviation", ""},
+                     rows});
 }
 
 std::optional<LearningCurve> learning_curve(const CompensatedModel& model) {

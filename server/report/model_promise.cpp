@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/base/unix_time.h"
 #include "server/measurement/pose_columns.h"
 #include "server/measurement/repeats.h"
 #include "server/report/html.h"
@@ -31,6 +32,16 @@ std::string check_by(const ModelProvenance& provenance) {
   const std::int64_t from = newest_measurement(provenance);
   return from > 0 ? "check again by " + shown_day(from + kFirstCheck * kDay)
                   : "when it was measured is not known, so check before use";
+}
+
+/// Where the day of the next check has passed.
+std::string overdue(const ModelProvenance& provenance) {
+  const std::int64_t from = newest_measurement(provenance), now = unix_now();
+  if (from <= 0 || now <= from + kFirstCheck * kDay) return "";
+  return fmt::format(
+      "<p class=\"warning\">That day had passed when this page was written, on {}: check the robot before you rely on "
+      "it.</p>\n",
+      shown_day(now));
 }
 
 std::string or_not_told(const std::string& text) { return text.empty() ? "not in the cell file" : text; }
@@ -122,6 +133,12 @@ std::string held(const PositionAccuracy& accuracy, double tolerance) {
   return accuracy.least() <= tolerance ? "not shown" : "no";
 }
 
+/// Rounded down, and never all of them: nobody knows that.
+std::string share_text(double share) {
+  const double percent = 100 * std::floor(1000 * share) / 1000;
+  return percent > 99.9 ? "over 99.9 %" : fmt::format("{:.1f} %", percent);
+}
+
 std::string tolerance_table(const PositionAccuracy& accuracy, const std::optional<double>& of_cell) {
   std::vector<double> tolerances = {0.05e-3, 0.1e-3, 0.2e-3, 0.5e-3, 1e-3};
   if (of_cell) tolerances.push_back(*of_cell);
@@ -130,12 +147,11 @@ std::string tolerance_table(const PositionAccuracy& accuracy, const std::optiona
   std::vector<HtmlRow> rows;
   for (const double tolerance : tolerances) {
     const bool asked = of_cell && tolerance == *of_cell;
-    rows.push_back(
-        {{fmt::format("{:.4g} mm{}", to_mm(tolerance), asked ? " (the cell's)" : ""), held(accuracy, tolerance),
-          fmt::format("{:.1f} %", 100 * std::floor(1000 * accuracy.within(tolerance)) / 1000)},
-         asked ? "asked" : ""});
+    rows.push_back({{fmt::format("{:.4g} mm{}", to_mm(tolerance), asked ? " (the cell's)" : ""),
+                     held(accuracy, tolerance), share_text(accuracy.within(tolerance))},
+                    asked ? "asked" : ""});
   }
-  return html_table({"tolerances", {"may I ask for", "held at 95 %?", "positions inside"}, rows});
+  return html_table({"tolerances", {"may I ask for", "at 95 % of positions?", "positions inside"}, rows});
 }
 
 std::string tolerance_sentence(const PositionAccuracy& accuracy, const std::optional<double>& of_cell) {
@@ -165,8 +181,13 @@ std::string certificate(const CompensatedModel& model, const std::optional<Posit
                         const std::optional<MeasurementBatch>& batch) {
   const std::string papers = papers_table(model, accuracy);
   if (!accuracy) return papers;
+  const std::string late = overdue(model.provenance());
   const std::optional<double> tolerance = rules_of(model.cell()).value_or(CellRules{}).tolerance;
-  return tolerance_sentence(*accuracy, tolerance) + tolerance_table(*accuracy, tolerance) + "\n<h3>In numbers</h3>\n" +
+  return late + tolerance_sentence(*accuracy, tolerance) + tolerance_table(*accuracy, tolerance) +
+         "\n<p>This holds in the volume and with the tool and payload named below, for targets that <code>trammel "
+         "correct</code> has corrected; of each it says whether it is inside that volume and what error to expect. "
+         "Not in it: how well the part is located, forces of the process, wear of the tool, and a robot that has "
+         "changed since.</p>\n<h3>In numbers</h3>\n" +
          iso_table(model, *accuracy, batch) + "\n<h3>Of what</h3>\n" + papers +
          fmt::format(
              "\n<p class=\"note\">Of the true position of the tool after correction by this model, the "

@@ -20,4 +20,12 @@ std::string shown_day(std::int64_t unix_s) {
   return text.data();
 }
 
+std::string with_micro(std::string text) {
+  for (std::size_t at = text.find(" um"); at != std::string::npos; at = text.find(" um", at + 1)) {
+    const bool ends = at + 3 == text.size() || std::string_view(" ,.;:)").find(text[at + 3]) != std::string_view::npos;
+    if (ends) text.replace(at + 1, 1, "µ");
+  }
+  return text;
+}
+
 }  // namespace trammel

@@ -14,4 +14,7 @@ namespace trammel {
 /// `2026-11-22`, UTC; a dash where no time is known (0 or less).
 [[nodiscard]] std::string shown_day(std::int64_t unix_s);
 
+/// Text that was written for terminals, with µm where it says um.
+[[nodiscard]] std::string with_micro(std::string text);
+
 }  // namespace trammel

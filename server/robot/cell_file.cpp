@@ -149,6 +149,8 @@ void read_tools(const YamlMap& map, Cell& cell) {
     map.refuse("tools", refused("no tool").beyond(0, 1).next("name at least one, as null where its pose is unknown"));
 }
 
+constexpr double kHeaviest = 5000;  // kg; no robot carries more
+
 void read_payloads(const YamlMap& map, Cell& cell) {
   if (map.is_null("payloads")) return;
   const YamlMap payloads = map.map("payloads");
@@ -159,6 +161,11 @@ void read_payloads(const YamlMap& map, Cell& cell) {
       entry.only({"mass_kg", "cog_mm"});
       Payload payload{entry.number("mass_kg"), read_vector(entry, "cog_mm") * from_mm(1)};
       if (payload.mass < 0) entry.refuse("mass_kg", refused("below 0").beyond(payload.mass, 0));
+      if (payload.mass > kHeaviest) {
+        entry.refuse("mass_kg", refused("{:g}, limit {:g}", payload.mass, kHeaviest)
+                                    .beyond(payload.mass, kHeaviest)
+                                    .next("in grams? write it in kg"));
+      }
       cell.payloads[name] = payload;
     });
   }

@@ -156,6 +156,8 @@ Status check_is_new(const std::string& path) {
 Result<StoreCopy> back_up_store(const std::string& from, const std::string& to,
                                 const std::function<void(double)>& progress) {
   if (const Status is_new = check_is_new(to); !is_new) return tl::make_unexpected(is_new.error());
+  if (std::error_code error; !fs::exists(from, error))
+    return failure(ErrorCode::kNotFound, "no such store").in(from).next("its path stands in the server file as store");
   remove_leftover_parts(to);
   const std::string part = part_beside(to).string();
   const Unfinished unfinished(part);

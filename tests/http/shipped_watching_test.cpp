@@ -89,6 +89,73 @@ TEST(ShippedWatching, ThePanelsOfTheDashboardStandBesideEachOtherAndAskTheChosen
   EXPECT_EQ(dashboard["templating"]["list"][0]["name"], "datasource");
 }
 
+nlohmann::json shipped_dashboard() { return nlohmann::json::parse(test::read_file(kFolder + "dashboard.json")); }
+
+/// As Grafana's schema of dashboards has them (kinds/dashboard of its sources; units: valueFormats/categories.ts).
+TEST(ShippedWatching, TheDashboardHasWhatGrafanasSchemaAsksFor) {
+  const auto dashboard = shipped_dashboard();
+  EXPECT_GE(dashboard["schemaVersion"].get<unsigned>(), 36u);
+  EXPECT_TRUE(dashboard["version"].is_number_unsigned());
+  EXPECT_GE(dashboard["uid"].get<std::string>().size(), 8u);
+  EXPECT_LE(dashboard["uid"].get<std::string>().size(), 40u);
+  for (const char* text : {"title", "refresh", "timezone"}) EXPECT_TRUE(dashboard[text].is_string()) << text;
+  for (const char* end : {"from", "to"}) EXPECT_TRUE(dashboard["time"][end].is_string()) << end;
+  EXPECT_TRUE(dashboard["annotations"]["list"].is_array());
+  static const std::set<std::string> kUnits = {"short", "s", "bytes", "reqps", "cps", "percentunit"};
+  static const std::set<std::string> kPanels = {"timeseries", "stat", "table", "gauge", "bargauge", "text", "row"};
+  for (const auto& panel : dashboard["panels"]) {
+    SCOPED_TRACE(panel["title"].get<std::string>());
+    EXPECT_TRUE(kPanels.contains(panel["type"].get<std::string>()));
+    EXPECT_TRUE(panel["options"].is_object());
+    EXPECT_TRUE(panel["fieldConfig"]["overrides"].is_array());
+    EXPECT_TRUE(kUnits.contains(panel["fieldConfig"]["defaults"]["unit"].get<std::string>()));
+    const auto& place = panel["gridPos"];
+    EXPECT_GE(place["h"].get<int>(), 1);
+    EXPECT_GE(place["w"].get<int>(), 1);
+    EXPECT_LE(place["x"].get<int>() + place["w"].get<int>(), 24);
+    std::set<std::string> references;
+    for (const auto& target : panel["targets"]) {
+      EXPECT_TRUE(references.insert(target["refId"].get<std::string>()).second);
+      EXPECT_EQ(target["datasource"]["type"], "prometheus");
+      EXPECT_TRUE(target["legendFormat"].is_string());
+    }
+  }
+}
+
+TEST(ShippedWatching, TheDashboardAsksWithVariablesThatItHas) {
+  const auto dashboard = shipped_dashboard();
+  static const std::set<std::string> kTypes = {"query", "constant", "datasource", "interval", "textbox", "custom"};
+  std::set<std::string> known;
+  for (const auto& variable : dashboard["templating"]["list"]) {
+    EXPECT_TRUE(kTypes.contains(variable["type"].get<std::string>()));
+    EXPECT_LE(variable["hide"].get<unsigned>(), 2u);
+    known.insert(variable["name"].get<std::string>());
+  }
+  static const std::regex kVariable("\\$\\{?([a-z_]+)");
+  const std::string text = dashboard["panels"].dump();
+  int used = 0;
+  for (auto at = std::sregex_iterator(text.begin(), text.end(), kVariable); at != std::sregex_iterator(); ++at, ++used)
+    EXPECT_TRUE(known.contains((*at)[1])) << at->str();
+  EXPECT_GT(used, 20);
+}
+
+TEST(ShippedWatching, PromtoolParsesEveryQueryOfTheDashboard) {
+  if (test::run({"/bin/sh", "-c", "command -v promtool"}).exit_code != 0)
+    GTEST_SKIP() << "promtool is not there (package prometheus)";
+  std::string rules = "groups:\n- name: dashboard\n  rules:\n";
+  int count = 0;
+  for (const auto& panel : shipped_dashboard()["panels"]) {
+    for (const auto& target : panel["targets"]) {
+      const std::string query = std::regex_replace(target["expr"].get<std::string>(), std::regex("\\$instance"), ".*");
+      rules += fmt::format("  - record: \"dashboard:{}\"\n    expr: {}\n", ++count, nlohmann::json(query).dump());
+    }
+  }
+  const test::TemporaryFolder folder;
+  const auto done = test::run({"/usr/bin/env", "promtool", "check", "rules", folder.write("queries.yml", rules)});
+  EXPECT_EQ(done.exit_code, 0) << done.out << done.err;
+  EXPECT_NE(done.out.find(fmt::format("{} rules found", count)), std::string::npos) << done.out;
+}
+
 TEST(ShippedWatching, PromtoolTakesTheRulesAndTheConfiguration) {
   if (test::run({"/bin/sh", "-c", "command -v promtool"}).exit_code != 0)
     GTEST_SKIP() << "promtool is not there (package prometheus)";

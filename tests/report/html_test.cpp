@@ -13,9 +13,18 @@ TEST(Html, ATableHasACellForEachTextAndARowSaysWhatItIs) {
   const HtmlTable table = {.kind = "k",
                            .head = {"a", "b"},
                            .rows = {{.cells = {"1", "2"}}, {.cells = {"", "3"}, .kind = "wide", .last_spans = 2}}};
-  EXPECT_EQ(html_table(table),
-            "<table class=\"k\">\n<tr><th>a</th><th>b</th></tr>\n<tr><td>1</td><td>2</td></tr>\n"
-            "<tr class=\"wide\"><td></td><td colspan=\"2\">3</td></tr>\n</table>");
+  EXPECT_EQ(
+      html_table(table),
+      "<table class=\"k\">\n<thead><tr><th>a</th><th>b</th></tr></thead>\n<tbody>\n<tr><td>1</td><td>2</td></tr>\n"
+      "<tr class=\"wide\"><td></td><td colspan=\"2\">3</td></tr>\n</tbody></table>");
+}
+
+TEST(Html, OfATableThatStacksEachCellSaysItsColumnAndOfOneThatFlowsAllButTheFirst) {
+  EXPECT_NE(html_table({"k stacks", {"a", "b", ""}, {{{"1", "2", "3"}}}})
+                .find("<td data-name=\"a\">1</td><td data-name=\"b\">2</td><td>3</td>"),
+            std::string::npos);
+  EXPECT_NE(html_table({"flows", {"a", "b"}, {{{"1", "2"}}}}).find("<td>1</td><td data-name=\"b\">2</td>"),
+            std::string::npos);
 }
 
 TEST(Html, ATableWithoutNamesHasNoRowOfThem) {

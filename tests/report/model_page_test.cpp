@@ -8,6 +8,7 @@
 #include <numeric>
 #include <sstream>
 
+#include "server/base/unix_time.h"
 #include "server/measurement/checked_batch.h"
 #include "server/report/model_poses.h"
 #include "server/report/model_promise.h"
@@ -70,7 +71,9 @@ TEST_F(ModelPage, ShowsWhatIsLeftOfTheOrientationsWhereTheyWereMeasured) {
   parts.training.orientation = OrientationFigures{30, 0.02, 0.002, 0.001, 0.934};
   const std::string page = model_page(CompensatedModel::make(parts).value(), std::nullopt);
   EXPECT_TRUE(has(page, "orientation, deg rms of 30 poses"));
-  EXPECT_TRUE(has(page, "<td>1.1459</td><td>0.1146</td><td>0.0573</td><td>93.4 %</td>"));
+  for (const char* shown : {"nominal\">1.1459</td>", "calibrated\">0.1146</td>", "compensated\">0.0573</td>",
+                            "inside their 95 % interval\">93.4 %</td>"})
+    EXPECT_TRUE(has(page, shown)) << shown;
   parts.training.orientation.reset();
   EXPECT_FALSE(has(model_page(CompensatedModel::make(parts).value(), std::nullopt), "orientation, deg"));
 }
@@ -153,6 +156,14 @@ TEST_F(ModelPage, BeginsWithHowGoodItIsWhereAndUntilWhen) {
   const std::string page = model_page(model, std::nullopt);
   EXPECT_TRUE(has(page, "<p id=\"promise\">" + promise));
   EXPECT_LT(page.find(promise), page.find("<table"));
+}
+
+TEST_F(ModelPage, SaysThatTheDayOfTheNextCheckHasPassedWhereItHas) {
+  EXPECT_TRUE(has(model_page(trained_on(cell_with(""), batch_), std::nullopt), "That day had passed"));
+  CompensatedModel::Parts parts = trained_on(cell_with(""), batch_).parts();
+  parts.provenance.trained_at = unix_now();
+  parts.provenance.measured_at = unix_now();
+  EXPECT_FALSE(has(model_page(CompensatedModel::make(parts).value(), std::nullopt), "That day had passed"));
 }
 
 TEST(RoundedUp, IsNeverSmallerThanTheLength) {
@@ -275,7 +286,7 @@ TEST_F(ModelPage, ListsTheWorstPosesFirst) {
   MeasurementBatch rows = checked->rows();
   rows.measurements[7].p_W.z() += 1e-3;
   const std::string page = model_page(trained("none"), rows);
-  const std::size_t table = page.find("<table class=\"poses\">");
+  const std::size_t table = page.find("<table class=\"poses ");
   ASSERT_NE(table, std::string::npos);
   const std::size_t first = page.find("<tr><td>", table);
   EXPECT_EQ(page.substr(first + 8, rows.measurements[7].pose_id.size() + 1), rows.measurements[7].pose_id + "<");

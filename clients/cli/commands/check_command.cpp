@@ -11,10 +11,13 @@
 #include "server/base/json_guard.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
+#include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/report/cell_health.h"
 #include "server/report/health_json.h"
+#include "server/report/health_page.h"
+#include "server/report/pages_beside.h"
 #include "server/robot/cell_rules.h"
 
 namespace trammel::cli {
@@ -22,7 +25,7 @@ namespace trammel::cli {
 namespace {
 
 struct CheckArguments {
-  std::string model, batch, json;
+  std::string model, batch, json, report;
   std::vector<std::string> earlier;
   std::optional<double> tolerance_mm;
   bool new_tool = false;
@@ -53,6 +56,9 @@ Result<nlohmann::ordered_json> found_by(client::Session& session, const std::str
   return check_of(found->findings_json, fmt::format("what job {} found", job));
 }
 
+/// What the measurements are called: a file without its folder and ending, or the id that the service has them by.
+std::string batch_name(const std::string& batch) { return std::filesystem::path(batch).stem().string(); }
+
 /// `next check: 2026-03-01; ...`; empty where nothing is said of it.
 std::string due_text(const nlohmann::ordered_json& check) {
   const auto text_of = [&](const char* key) {
@@ -66,6 +72,11 @@ std::string due_text(const nlohmann::ordered_json& check) {
 std::string check_text(const nlohmann::ordered_json& check) {
   return fmt::format("{}: {}\n", check.at("verdict").get<std::string>(), check.at("why").get<std::string>()) +
          due_text(check);
+}
+
+Status write_report(const nlohmann::ordered_json& found, const HealthPageOf& of, const CheckArguments& arguments) {
+  if (arguments.report.empty()) return {};
+  return write_output(arguments.report, with_pages_beside(health_page(found.dump(), of), arguments.report));
 }
 
 /// What earlier checks said.
@@ -103,7 +114,10 @@ Status check_at_service(const CheckArguments& arguments) {
   if (end->stage == "failed") return refused("job {} of cell {} failed: {}", end->job, end->cell, end->what).of("job");
   const auto json = found_by(**session, model->cell, *job);
   if (!json) return tl::make_unexpected(json.error());
-  tell(check_text(*json), {arguments.json});
+  tell(check_text(*json), {arguments.json, arguments.report});
+  if (const Status written = write_report(*json, {model->cell, batch_name(arguments.batch), unix_now()}, arguments);
+      !written)
+    return written;
   return write_json(arguments.json, *json);
 }
 
@@ -143,8 +157,11 @@ Status check(const CheckArguments& arguments) {
   const Result<HealthCheck> health = check_health(*model, *batch, options);
   if (!health) return tl::make_unexpected(health.error());
   const auto& rows = batch->rows().measurements;
-  tell(health_text(*health), {arguments.json});
-  return write_json(arguments.json, health_json(*health, {batch->id(), rows.empty() ? "" : rows.front().pose_id}));
+  const auto json = health_json(*health, {batch->id(), rows.empty() ? "" : rows.front().pose_id});
+  tell(health_text(*health), {arguments.json, arguments.report});
+  const Status written = write_report(json, {model->cell().name, batch->id(), unix_now(), &model->cell()}, arguments);
+  if (!written) return written;
+  return write_json(arguments.json, json);
 }
 
 }  // namespace
@@ -169,6 +186,8 @@ void add_check_command(CLI::App& app, Action& chosen) {
       ->check(above_zero());
   command->add_flag("--new-tool", arguments->new_tool,
                     "The tool was changed or mounted anew: where it sits is found with the base, and is no change");
+  command->add_option("--report", arguments->report, "Page to write (HTML); opens without a network")
+      ->type_name("FILE");
   add_json_option(*command, arguments->json);
   add_service_options(*command, arguments->service);
   command->callback([arguments, &chosen] {

@@ -19,6 +19,8 @@
 #include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
 #include "server/measurement/pose_columns.h"
+#include "server/report/pages_beside.h"
+#include "server/robot/cell_papers.h"
 
 namespace trammel::cli {
 
@@ -56,18 +58,29 @@ cam::CorrectProgramOptions options_of(const CorrectProgramArguments& arguments) 
   return {arguments.tool, arguments.payload, arguments.keep_digits, TRAMMEL_VERSION, today()};
 }
 
-Result<cam::CorrectedProgram> correct_here(const cam::Program& program, const CorrectProgramArguments& arguments) {
+/// A corrected program, and what the model's cell file says of robot, instrument and operator.
+struct Corrected {
+  cam::CorrectedProgram program;
+  CellPapers papers;
+};
+
+Result<Corrected> with_papers(Result<cam::CorrectedProgram> program, const CompensatedModel& model) {
+  if (!program) return tl::make_unexpected(program.error());
+  return Corrected{std::move(*program), papers_of(model.cell()).value_or(CellPapers())};
+}
+
+Result<Corrected> correct_here(const cam::Program& program, const CorrectProgramArguments& arguments) {
   const Result<CompensatedModel> model = load_model(arguments.model);
   if (!model) return tl::make_unexpected(model.error());
   ProgressLine progress;
-  return cam::correct_program(program, model->cell().robot, tools_of(*model), ask_model(*model, progress),
-                              options_of(arguments));
+  return with_papers(cam::correct_program(program, model->cell().robot, tools_of(*model), ask_model(*model, progress),
+                                          options_of(arguments)),
+                     *model);
 }
 
 /// Tools and robot come from the model that answers.
-Result<cam::CorrectedProgram> correct_by_service(const cam::Program& program,
-                                                 const CorrectProgramArguments& arguments) {
-  return with_served_model<cam::CorrectedProgram>(
+Result<Corrected> correct_by_service(const cam::Program& program, const CorrectProgramArguments& arguments) {
+  return with_served_model<Corrected>(
       arguments.model, arguments.service,
       [&](client::Session& session, const client::CallContext& of, const CompensatedModel& model, const SawModel& saw) {
         ProgressLine progress;
@@ -81,7 +94,8 @@ Result<cam::CorrectedProgram> correct_by_service(const cam::Program& program,
           if (answer) saw(answer->model);
           return answer;
         };
-        return cam::correct_program(program, model.cell().robot, tools_of(model), ask, options_of(arguments));
+        return with_papers(
+            cam::correct_program(program, model.cell().robot, tools_of(model), ask, options_of(arguments)), model);
       });
 }
 
@@ -114,9 +128,11 @@ Result<Extent> undo(const ProgramFiles& marked, const CorrectProgramArguments& a
   return Extent::kAll;
 }
 
-Status write_receipts(const cam::CorrectedProgram& corrected, const CorrectProgramArguments& arguments) {
+Status write_receipts(const Corrected& done, const CorrectProgramArguments& arguments) {
+  const cam::CorrectedProgram& corrected = done.program;
   if (!arguments.report.empty()) {
-    const Status written = write_output(arguments.report, receipt_page(corrected, arguments.tolerance_mm));
+    const std::string page = receipt_page(corrected, arguments.tolerance_mm, done.papers);
+    const Status written = write_output(arguments.report, with_pages_beside(page, arguments.report));
     if (!written) return written;
   }
   if (!arguments.receipt.empty()) {
@@ -145,9 +161,10 @@ Result<Extent> correct_program(const CorrectProgramArguments& arguments) {
     reading.frames = std::move(*frames);
   }
   const cam::Program program = cam::read_program(files->dialect, files->files, reading);
-  const Result<cam::CorrectedProgram> corrected =
+  const Result<Corrected> done =
       arguments.service.service ? correct_by_service(program, arguments) : correct_here(program, arguments);
-  if (!corrected) return tl::make_unexpected(corrected.error());
+  if (!done) return tl::make_unexpected(done.error());
+  const cam::CorrectedProgram* const corrected = &done->program;
   const std::string left = left_alone_text(*corrected);
   if (arguments.strict && !left.empty()) return refused("nothing is written: {}", left.substr(0, left.size() - 1));
   if (const Status written = write_files(*files, corrected->files, corrected->changed, *paths); !written)
@@ -155,10 +172,11 @@ Result<Extent> correct_program(const CorrectProgramArguments& arguments) {
   std::string told = receipt_summary(*corrected) + left;
   if (arguments.tolerance_mm > 0) told += verdict_text(tolerance_verdict(*corrected, arguments.tolerance_mm)) + "\n";
   fmt::print(stderr, "{}", shown_lines(told));
-  if (const Status written = write_receipts(*corrected, arguments); !written)
-    return tl::make_unexpected(written.error());
+  if (const Status written = write_receipts(*done, arguments); !written) return tl::make_unexpected(written.error());
   const bool nothing = corrected->rows.empty();
-  if (nothing) fmt::print(stderr, "note: no motion in it is understood, so it is as it was\n");
+  if (nothing)
+    fmt::print(stderr, "note: no motion in it is understood as {}, so it is as it was; --format names another kind\n",
+               cam::name_of(files->dialect));
   return (left.empty() && !nothing) || arguments.allow_failed ? Extent::kAll : Extent::kPart;
 }
 

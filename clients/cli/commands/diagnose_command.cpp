@@ -13,6 +13,7 @@
 #include "server/diagnose/diagnose.h"
 #include "server/report/diagnosis_json.h"
 #include "server/report/diagnosis_page.h"
+#include "server/report/pages_beside.h"
 #include "server/robot/cell_sources_file.h"
 
 namespace trammel::cli {
@@ -160,7 +161,7 @@ Status write_diagnosis(const ordered_json& json, std::string page, Outputs& outp
                        const DiagnoseArguments& arguments) {
   const bool poses = !json.at("next_poses").empty();
   if (poses) outputs.put("--next-poses", next_poses_csv(json));
-  outputs.put("--report", std::move(page));
+  outputs.put("--report", with_pages_beside(std::move(page), arguments.report));
   outputs.put("--json", json_text(json));
   if (const Status written = outputs.write(); !written) return written;
   if (!poses && !arguments.next_poses.empty()) {

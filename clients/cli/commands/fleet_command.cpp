@@ -4,8 +4,11 @@
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "server/base/json_guard.h"
+#include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
 #include "server/report/fleet_json.h"
+#include "server/report/fleet_page.h"
+#include "server/report/pages_beside.h"
 
 namespace trammel::cli {
 
@@ -15,7 +18,7 @@ using nlohmann::ordered_json;
 
 struct FleetArguments {
   std::vector<std::string> models;
-  std::string json;
+  std::string json, report;
   ServiceOptions service;
 };
 
@@ -56,8 +59,12 @@ Status fleet(const FleetArguments& arguments) {
   const Result<ordered_json> json =
       arguments.service.service ? fleet_of_service(arguments) : fleet_of_files(arguments.models);
   if (!json) return tl::make_unexpected(json.error());
+  if (!arguments.report.empty()) {
+    const std::string page = with_pages_beside(fleet_page(*json, unix_now()), arguments.report);
+    if (const Status written = write_output(arguments.report, page); !written) return written;
+  }
   try {
-    tell(fleet_text(*json), {arguments.json});
+    tell(fleet_text(*json), {arguments.json, arguments.report});
   } catch (const ordered_json::exception& error) {
     return failure(ErrorCode::kInternal, "the service's fleet is none: {}", error.what());
   }
@@ -71,6 +78,8 @@ void add_fleet_command(CLI::App& app, Action& chosen) {
   CLI::App* command =
       app.add_subcommand("fleet", "List cells, their health, and what is unusual about each among robots of its type");
   command->add_option("--model", arguments->models, "Model file of a robot, once for each; or --service");
+  command->add_option("--report", arguments->report, "Page to write (HTML); opens without a network")
+      ->type_name("FILE");
   add_json_option(*command, arguments->json);
   add_service_options(*command, arguments->service);
   command->callback([arguments, &chosen] { chosen = [arguments] { return fleet(*arguments); }; });

@@ -8,6 +8,7 @@
 #include "server/base/units.h"
 #include "server/compensate/model_file.h"
 #include "server/report/history.h"
+#include "server/report/pages_beside.h"
 #include "server/store/audit_json.h"
 
 namespace trammel::cli {
@@ -119,7 +120,7 @@ Status history(const HistoryArguments& arguments) {
   const Result<CellHistory> found =
       arguments.models.empty() ? history_of_service(arguments) : history_of_files(arguments);
   if (!found) return tl::make_unexpected(found.error());
-  outputs.put("--output", history_page(*found));
+  outputs.put("--output", with_pages_beside(history_page(*found), arguments.output));
   outputs.put("--json", json_text(history_json(*found)));
   if (const Status written = outputs.write(); !written) return written;
   tell(fmt::format("cell {}: {} versions, {} parameters moved by more than their uncertainty\n", found->cell,

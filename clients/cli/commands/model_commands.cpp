@@ -18,6 +18,7 @@
 #include "server/error_sources/cause_words.h"
 #include "server/measurement/gauges.h"
 #include "server/report/model_page.h"
+#include "server/report/pages_beside.h"
 #include "server/robot/cell_rules.h"
 #include "server/trainer/pipeline/refitted.h"
 #include "server/trainer/pipeline/train.h"
@@ -258,7 +259,10 @@ Status report(const ReportArguments& arguments) {
     if (!world) return tl::make_unexpected(world.error());
     batch = std::move(world->batch);
   }
-  if (const Status written = write_output(arguments.output, model_page(*model, batch)); !written) return written;
+  if (const Status written =
+          write_output(arguments.output, with_pages_beside(model_page(*model, batch), arguments.output));
+      !written)
+    return written;
   tell(fmt::format("report of model {} in {}\n", model->provenance().id, arguments.output),
        {arguments.output, arguments.json});
   return write_json(arguments.json, model_json(*model));

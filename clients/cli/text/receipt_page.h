@@ -3,6 +3,7 @@
 #include <string>
 
 #include "clients/cam/correct_program.h"
+#include "server/robot/cell_papers.h"
 
 namespace trammel::cli {
 
@@ -18,7 +19,9 @@ struct ToleranceVerdict {
 /// `tolerance 0.2 mm: 33 of 35 targets inside with 95 % (before 0)`
 [[nodiscard]] std::string verdict_text(const ToleranceVerdict& verdict);
 
-/// The receipt as one self-contained page: path in 3D, figures, targets. `tolerance_mm` 0: no verdict.
-[[nodiscard]] std::string receipt_page(const cam::CorrectedProgram& program, double tolerance_mm);
+/// The receipt as one self-contained page: verdict, figures, path in 3D, targets. `tolerance_mm` 0: nothing is held
+/// against one. `papers`: of the model's cell.
+[[nodiscard]] std::string receipt_page(const cam::CorrectedProgram& program, double tolerance_mm,
+                                       const CellPapers& papers = {});
 
 }  // namespace trammel::cli

@@ -10,38 +10,51 @@ constexpr std::string_view kReceiptPage = R"page(<!DOCTYPE html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
+{{mark}}
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>Trammel: corrected program</title>
 <style>{{page_css}}</style>
 <style>
-.targets { font-size: 13px; } .targets td:nth-child(n+2):nth-child(-n+10) { white-space: nowrap; } .targets td:nth-child(7), .targets td:nth-child(8), .targets td:nth-child(9), .targets td:nth-child(10) { text-align: right; }
+.targets { font-size: 13px; } .targets td:nth-child(n+3):nth-child(-n+10) { white-space: nowrap; } .targets td:nth-child(-n+2) { overflow-wrap: anywhere; } .targets td:nth-child(7), .targets td:nth-child(8), .targets td:nth-child(9), .targets td:nth-child(10) { text-align: right; }
 table.facts { width: auto; } table.facts td:first-child { color: var(--soft); }
-tr.left td { background: #fbe6da; } tr.out_of_domain td { background: #fff6e0; } tr.verdict td { font-weight: 600; }
+tr.left td { background: #fbe6da; } tr.out_of_domain td { background: #fff6e0; }
 #path { display: block; width: 100%; height: 28rem; border: 1px solid var(--line); border-radius: 6px; touch-action: none; cursor: grab; }
 .bar { display: flex; gap: 6px 16px; align-items: center; margin: .5rem 0; flex-wrap: wrap; }
 #scale { height: .8rem; width: 12rem; border-radius: 3px; }
 #under { color: var(--soft); min-height: 1.4em; }
-@media screen and (max-width: 760px) { #path { height: 18rem; } }
-@media print { #path { height: 20rem; break-inside: avoid; } .targets { font-size: 8px; } .targets td:nth-child(n) { white-space: normal; } }
+@media screen and (max-width: 860px) {
+  #path { height: 18rem; }
+  /* A target is a card: names of columns stand in the style, for there may be thousands of targets. */
+  .targets, .targets tbody, .targets tr { display: block; } .targets thead, .targets td:empty { display: none; }
+  .targets tr { padding: 6px 8px; border-bottom: 1px solid var(--line); }
+  .targets td, .targets td:nth-child(n) { display: inline-block; border: 0; padding: 0 14px 0 0; text-align: left; white-space: normal; background: none; }
+  .targets td:nth-child(-n+2) { font-weight: 600; } tr.left { background: #fbe6da; } tr.out_of_domain { background: #fff6e0; }
+  .targets td:nth-child(n+4)::before { color: var(--soft); } .targets td:nth-child(4)::before { content: "tool "; } .targets td:nth-child(5)::before { content: "frame "; }
+  .targets td:nth-child(7)::before { content: "before, mm "; } .targets td:nth-child(8)::before { content: "after, mm "; }
+  .targets td:nth-child(9)::before { content: "sigma, mm "; } .targets td:nth-child(10)::before { content: "rounding, mm "; }
+}
+@media print { tr { break-inside: avoid; } #path { height: 16rem; break-inside: avoid; } .targets { font-size: 8px; } .targets td:nth-child(n) { white-space: normal; } }
 </style>
 </head>
 <body>
 <main>
 <h1>Corrected program</h1>
 <p class="subtitle">{{subtitle}}</p>
+<nav class="beside"></nav>
 <section>
+<p class="verdict" id="verdict">{{verdict}}</p>
 {{facts}}
 </section>
 <section>
 <h2>Path</h2>
 <div class="bar">
-<label><input type="radio" name="by" value="after" checked> expected error after</label>
-<label><input type="radio" name="by" value="before"> before</label>
-<span id="low"></span><span id="scale"></span><span id="high"></span>
+<label class="screen"><input type="radio" name="by" value="after" checked> expected error after</label>
+<label class="screen"><input type="radio" name="by" value="before"> before</label>
+<span>expected error:</span> <span id="low"></span><span id="scale"></span><span id="high"></span>
 <span>ringed: out of domain; crossed: left as it was</span>
 </div>
 <canvas id="path"></canvas>
-<div id="under">Drag to turn, wheel to zoom, shift and drag to move.</div>
+<div id="under" class="screen">Drag to turn, wheel to zoom, shift and drag to move.</div>
 </section>
 <section>
 <h2>Targets</h2>

@@ -92,6 +92,10 @@ Status check_is_text(std::string_view text, const std::string& where) {
     return refused("not text but a {}", text.front() == '%' ? "PDF" : "compressed file")
         .in(where)
         .next("name the table itself, as CSV");
+  if (const std::string_view seen = without_mark(text); seen.starts_with("<"sv))
+    return refused("not text but {}", seen.starts_with("<?xml"sv) ? "XML" : "a web page")
+        .in(where)
+        .next("name the table itself, as CSV");
   return {};
 }
 

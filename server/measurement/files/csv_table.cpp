@@ -151,9 +151,22 @@ bool says_nothing(const CsvTable::Row& row) {
          std::all_of(row.fields.begin(), row.fields.end(), [](const std::string& field) { return field.empty(); });
 }
 
+/// Whether most of the row's values are numbers with a point, as measured ones are.
+bool is_numbers(const CsvTable::Row& row) {
+  const auto numbers = std::count_if(row.fields.begin(), row.fields.end(), [](const std::string& field) {
+    return field.find('.') != std::string::npos && field.find_first_not_of("+-.0123456789eE ") == std::string::npos;
+  });
+  return 2 * static_cast<std::size_t>(numbers) > row.fields.size();
+}
+
 }  // namespace
 
 Status CsvTable::set_columns(Row header) {
+  if (is_numbers(header))
+    return refused("numbers where the names of the columns are expected")
+        .in(where_)
+        .at_row(header.line)
+        .next("put a line of names above them; trammel help formats tells the names");
   std::set<std::string> seen;
   for (const std::string& name : header.fields) {
     if (name.empty())

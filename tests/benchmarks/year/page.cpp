@@ -3,6 +3,7 @@
 #include <map>
 
 #include "server/base/units.h"
+#include "server/base/unix_time.h"
 #include "server/report/html.h"
 #include "server/report/page_parts.h"
 #include "tests/benchmarks/year/score.h"
@@ -12,29 +13,52 @@ namespace {
 
 constexpr double kWidth = 900, kHeight = 150, kLeft = 46, kLow = 3e-6, kHigh = 3e-3;
 
-constexpr std::string_view kPage = R"(<!doctype html><html lang="en"><meta charset="utf-8">
-<meta name="viewport" content="width=device-width"><title>A year of a plant</title><style>{{style}}
+constexpr std::string_view kPage = R"(<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>A year of a plant</title>
+<style>{{style}}
 svg{width:100%;height:auto}.holes{stroke:#0b66a8}.oracle{stroke:#777}.gp{stroke:#b5651d}polyline{fill:none;stroke-width:1.6}
-.event{stroke:#a3123f;stroke-dasharray:4 3}.axis{stroke:#ccc}text{font:11px sans-serif;fill:#555}</style>
-<h1>A year of a plant</h1><p>{{verdict}}</p>{{figures}}
-<p>True error of each arm's holes week by week, mm rms, logarithmic: <b style="color:#0b66a8">as the service said</b>,
+.event{stroke:#a3123f;stroke-dasharray:4 3}.axis{stroke:#ccc}text{font:11px sans-serif;fill:#555}
+h3,svg{break-inside:avoid} @media (max-width:620px){text{font-size:22px}} </style>
+</head>
+<body>
+<main>
+<h1>A year of a plant</h1>
+<p class="subtitle">{{span}}</p>
+<section><p class="verdict">{{verdict}}</p>{{figures}}</section>
+<section><h2>Arms</h2>
+<p class="note">True error of each arm's holes week by week, mm rms, logarithmic: <b style="color:#0b66a8">as the service said</b>,
 <b style="color:#777">of a fresh model (oracle)</b>, <b style="color:#b5651d">of a Gaussian process without physics</b>.
-Shaded: weeks in which the service warned. Dashed: something happened to the arm.</p>{{arms}}<h2>What happened</h2>{{events}}
+Shaded: weeks in which the service warned. Dashed: something happened to the arm.</p>{{arms}}</section>
+<section><h2>What happened</h2>{{events}}</section>
+</main>
+</body>
 </html>)";
 
-double x_of(int week) { return kLeft + (kWidth - kLeft) * week / 52.0; }
+/// The weeks that are drawn.
+int last_week(const YearScore& score) {
+  int last = 1;
+  for (const WeekOfArm& week : score.weeks) last = std::max(last, week.week);
+  return last;
+}
+
+double x_of(int week, int last) { return kLeft + (kWidth - kLeft - 10) * week / last; }
 double y_of(double error) {
   const double share = std::log(std::clamp(error, kLow, kHigh) / kLow) / std::log(kHigh / kLow);
   return kHeight - 14 - share * (kHeight - 24);
 }
 
-std::string line(const std::vector<WeekOfArm>& weeks, double WeekOfArm::*error, const std::string& kind) {
+std::string line(const std::vector<WeekOfArm>& weeks, double WeekOfArm::*error, const std::string& kind, int last) {
   std::string points;
-  for (const WeekOfArm& week : weeks) points += fmt::format("{:.1f},{:.1f} ", x_of(week.week), y_of(week.*error));
+  for (const WeekOfArm& week : weeks) points += fmt::format("{:.1f},{:.1f} ", x_of(week.week, last), y_of(week.*error));
   return fmt::format("<polyline class=\"{}\" points=\"{}\"/>", kind, points);
 }
 
 std::string drawn(const std::string& cell, const std::vector<WeekOfArm>& weeks, const YearScore& score) {
+  const int last = last_week(score);
   std::string svg =
       fmt::format("<h3>{}</h3><svg viewBox=\"0 0 {} {}\" role=\"img\">", html_text(cell), kWidth, kHeight);
   for (const double level : {1e-5, 1e-4, 1e-3})
@@ -45,16 +69,16 @@ std::string drawn(const std::string& cell, const std::vector<WeekOfArm>& weeks, 
   for (const WeekOfArm& week : weeks)
     if (week.warned)
       svg += fmt::format("<rect x=\"{:.1f}\" y=\"0\" width=\"{:.1f}\" height=\"{}\" fill=\"#f3e3b3\"/>",
-                         x_of(week.week) - 8, 16.0, kHeight - 14);
+                         x_of(week.week, last) - 8, 16.0, kHeight - 14);
   for (const EventOfYear& event : score.events)
     if (event.cell == cell)
       svg += fmt::format(
           "<line class=\"event\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"0\" y2=\"{1}\"><title>{2}</title></line>",
-          x_of(event.week), kHeight - 14, html_text(event.what));
-  svg += line(weeks, &WeekOfArm::without_physics, "gp") + line(weeks, &WeekOfArm::oracle, "oracle") +
-         line(weeks, &WeekOfArm::holes, "holes");
-  for (int week = 0; week < 52; week += 13)
-    svg += fmt::format("<text x=\"{:.1f}\" y=\"{}\">week {}</text>", x_of(week), kHeight - 2, week);
+          x_of(event.week, last), kHeight - 14, html_text(event.what));
+  svg += line(weeks, &WeekOfArm::without_physics, "gp", last) + line(weeks, &WeekOfArm::oracle, "oracle", last) +
+         line(weeks, &WeekOfArm::holes, "holes", last);
+  for (int week = 0; week < last; week += std::max(1, last / 4))
+    svg += fmt::format("<text x=\"{:.1f}\" y=\"{}\">week {}</text>", x_of(week, last), kHeight - 2, week);
   return svg + "</svg>";
 }
 
@@ -66,7 +90,11 @@ std::string told(const EventOfYear& event) {
 }  // namespace
 
 std::string year_page(const YearScore& score) {
-  std::map<std::string, std::vector<WeekOfArm>> by_cell;
+  // cell-2 before cell-10.
+  const auto shorter_first = [](const std::string& a, const std::string& b) {
+    return std::pair(a.size(), a) < std::pair(b.size(), b);
+  };
+  std::map<std::string, std::vector<WeekOfArm>, decltype(shorter_first)> by_cell(shorter_first);
   for (const WeekOfArm& week : score.weeks) by_cell[week.cell].push_back(week);
   std::string arms;
   for (const auto& [cell, weeks] : by_cell) arms += drawn(cell, weeks, score);
@@ -94,11 +122,14 @@ std::string year_page(const YearScore& score) {
       "Of {} things that happened to {} arms, {} were named and {} seen and left open. The server was killed {} "
       "times.",
       score.events.size(), by_cell.size(), named, open, score.kills);
-  return fill_in(kPage, {{"style", std::string(page_style())},
-                         {"verdict", verdict},
-                         {"figures", html_table(figures)},
-                         {"arms", arms},
-                         {"events", html_table(events)}});
+  return fill_in(
+      kPage,
+      {{"style", std::string(page_style())},
+       {"span", fmt::format("{} arms over {} weeks · {}", by_cell.size(), last_week(score), shown_day(unix_now()))},
+       {"verdict", verdict},
+       {"figures", html_table(figures)},
+       {"arms", arms},
+       {"events", html_table(events)}});
 }
 
 }  // namespace trammel::year

@@ -1,10 +1,12 @@
-#include "server/http/check_page.h"
+#include "server/report/health_page.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "server/error_sources/spelling.h"
 #include "server/report/html.h"
+#include "server/report/page_parts.h"
+#include "server/report/plain_page.h"
 
 namespace trammel {
 namespace {
@@ -44,6 +46,8 @@ std::string figures(const json& found) {
   add("what a healthy robot is off by, rms", mm_in(found, "expected_rms_mm"));
   add("largest change that could hide", mm_in(found, "would_have_seen_mm"));
   const std::string due = text_in(found, "due"), because = text_in(found, "due_because");
+  const std::string model = text_in(found, "model");
+  if (!model.empty()) add("held against model", model);
   add("check again by", (due.empty() ? "cannot be said" : due) + (because.empty() ? "" : ": " + because));
   return html_table({"", {}, rows});
 }
@@ -57,7 +61,7 @@ std::string changes(const json& found) {
                      html_text(fmt::format("{}", fmt::join(others, ", ")))}});
   }
   return rows.empty() ? "<p>Nothing that these poses show.</p>"
-                      : html_table({"", {"what changed", "effect, rms", "U (k = 2)", "could also be"}, rows});
+                      : html_table({"stacks", {"what changed", "effect, rms", "U (k = 2)", "could also be"}, rows});
 }
 
 std::string hardest_to_see(const json& found) {
@@ -70,24 +74,27 @@ std::string hardest_to_see(const json& found) {
   return rows.empty() ? "<p>Not known.</p>" : html_table({"", {"cause", "seen from, rms"}, rows});
 }
 
-std::string section(const char* title, const std::string& body) {
-  return fmt::format("<section>\n<h2>{}</h2>\n{}\n</section>\n", title, body);
-}
-
 }  // namespace
 
-ServicePage check_page(const std::string& findings, const std::string& cell, std::int64_t job) {
+std::string health_sections(const std::string& findings, const std::string& links) {
   const json found = json::parse(findings, nullptr, false);
   std::string verdict = text_in(found, "verdict");
   std::replace(verdict.begin(), verdict.end(), '_', ' ');
-  const std::string links = html_link(cell_address(cell), "Cell " + cell) + " · " +
-                            html_link(fmt::format("/jobs/{}", job), fmt::format("Job {}", job)) + " · " +
-                            html_link(fmt::format("/jobs/{}/findings.json", job), "all of it as JSON");
-  return {fmt::format("Health of cell {}", cell),
-          section("Verdict", fmt::format("<p class=\"verdict\">{}: {}</p>\n<p>{}</p>", html_text(verdict),
-                                         html_text(text_in(found, "why")), links) +
-                                 figures(found)) +
-              section("What changed", changes(found)) + section("Hardest to see", hardest_to_see(found))};
+  return html_section("Verdict", fmt::format("<p class=\"verdict\">{}: {}</p>\n{}\n", html_text(verdict),
+                                             html_text(text_in(found, "why")), links) +
+                                     figures(found)) +
+         html_section("What changed", changes(found)) + html_section("Hardest to see", hardest_to_see(found));
+}
+
+std::string health_page(const std::string& findings, const HealthPageOf& of) {
+  const json found = json::parse(findings, nullptr, false);
+  std::string subtitle = fmt::format("batch {} · checked {}", of.batch, shown_day(of.at));
+  if (of.papers != nullptr)
+    subtitle = of.papers->robot.name() + " · " + subtitle + papers_text(papers_of(*of.papers).value_or(CellPapers()));
+  return plain_page({.mark = {"health", of.cell, text_in(found, "model")},
+                     .title = fmt::format("Health of cell {}", of.cell),
+                     .subtitle = subtitle,
+                     .body = health_sections(findings, "")});
 }
 
 }  // namespace trammel
