@@ -323,8 +323,7 @@ py::array_t<double> covariance_of(const api::Model& model) {
 }
 
 void add_model_file(py::class_<api::Model>& type) {
-  type
-      .def_static(
+  type.def_static(
           "load",
           [](const std::string& path) { return value_or_raise(unlocked([&] { return api::Model::load(path); })); },
           "path"_a)
@@ -349,8 +348,7 @@ void add_model_file(py::class_<api::Model>& type) {
 }
 
 void add_model_work(py::class_<api::Model>& type) {
-  type
-      .def(
+  type.def(
           "predict",
           [](const api::Model& model, const Numbers& joints_deg, std::string tool, std::string payload,
              std::vector<int> directions, std::optional<double> temperature_c) {
