@@ -9,6 +9,7 @@ import io
 import json
 import os
 import pathlib
+import pickle
 import signal
 import subprocess
 import sys
@@ -247,6 +248,18 @@ class Refusals(unittest.TestCase):
         with self.assertRaises(trammel.Refused) as raised:
             self.model.correct([[1000, 0, 1000, 1, 0, 0, 0]])
         self.assertEqual(raised.exception.row, 0)
+
+    def test_an_exception_keeps_its_data_on_the_way_from_another_process(self):
+        with self.assertRaises(trammel.Refused) as raised:
+            self.model.predict(np.full((1, 6), 500.0))
+        here, there = raised.exception, pickle.loads(pickle.dumps(raised.exception))
+        self.assertEqual(str(there), str(here))
+        self.assertEqual((type(there), there.row, there.value, there.limit), (trammel.Refused, 0, here.value, here.limit))
+
+    def test_what_a_notebook_shows(self):
+        self.assertEqual(repr(self.cell), "<Cell cell-7: ABB IRB 6640-205/2.75, 6 joints>")
+        self.assertEqual(repr(self.batch), "<Batch simulated: 40 poses>")
+        self.assertEqual(repr(self.model), f"<Model {self.model.id} of cell-7: base, bias none>")
 
     def test_a_service_that_is_not_there(self):
         with self.assertRaises(trammel.Unreachable):

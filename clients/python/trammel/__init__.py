@@ -182,6 +182,9 @@ class Cell:
         """Ids of its payloads."""
         return self._inside.payloads()
 
+    def __repr__(self) -> str:
+        return f"<Cell {self.name}: {self.robot}, {self.joints} joints>"
+
 
 class Batch:
     """Measurements taken together: commanded joints and measured tool positions. Immutable."""
@@ -237,6 +240,9 @@ class Batch:
 
     def __len__(self) -> int:
         return self._inside.size()
+
+    def __repr__(self) -> str:
+        return f"<Batch {self.name}: {len(self)} poses>"
 
     def csv(self) -> str:
         """Its text as it came."""
@@ -332,6 +338,9 @@ class Model:
         """
         return Corrections(**self._inside.correct(*_targets(pose, joints_deg, conf), tool, payload, list(directions),
                                                   temperature_c))
+
+    def __repr__(self) -> str:
+        return f"<Model {self.id} of {self.facts['cell']}: {self.facts['level']}, bias {self.bias}>"
 
     def evaluate(self, batches: Batches) -> Dict[str, Any]:
         """Measured against predicted, with the keys of `trammel evaluate --json`; mm and deg."""

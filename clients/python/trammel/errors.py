@@ -18,7 +18,7 @@ class TrammelError(Exception):
     code: str = "internal"  #: `usage refused not_found conflict too_large busy unreachable internal`
 
     def __init__(self, sentence: str, data: Optional[Mapping[str, Any]] = None) -> None:
-        super().__init__(sentence)
+        super().__init__(sentence, data)
         known: Mapping[str, Any] = data or {}
         self.message: str = known.get("message", sentence)  #: one clause that says what, with value and limit
         self.file: str = known.get("file", "")  #: path or id of what was read: a file, a batch, a model
@@ -30,6 +30,9 @@ class TrammelError(Exception):
         self.next: str = known.get("next", "")  #: what to do about it
         #: what else is wrong, found in the same reading
         self.also: List[TrammelError] = [exception_of(other) for other in known.get("also", [])]
+
+    def __str__(self) -> str:
+        return str(self.args[0])
 
 
 class Usage(TrammelError):
