@@ -109,6 +109,7 @@ TEST_F(CorrectProgram, WrongUsageChangesNothing) {
   EXPECT_EQ(correct({before, "-o", file("out.mod")}), kWrongUsage) << "no model";
   EXPECT_EQ(correct({"--model", model(), before, "-o", before}), kWrongUsage) << "over its input";
   EXPECT_EQ(correct({"--model", model(), "--format", "fortran", before, "-o", file("out.mod")}), kWrongUsage);
+  EXPECT_EQ(correct({"--model", model(), "--tool", "gripper", before, "-o", file("out.mod")}), kWrongUsage);
   EXPECT_EQ(correct({"--model", model(), folder_.write("x.txt", "x"), "-o", file("out.mod")}), kWrongUsage);
   EXPECT_EQ(text("m.mod"), was);
   EXPECT_FALSE(exists("out.mod"));

@@ -395,6 +395,11 @@ const std::vector<Mistake>& mistakes() {
       {"no such store", {"backup", "--store", "nothing.db", "-o", "m"}, 3, "nothing.db", "", 0, "server file"},
       {"neither a cell nor models", {"history", "-o", "m"}, 2, "", "--cell"},
       {"a check of nothing", {"check", "--model", "${MODEL}"}, 2, "", "--batch", 0, "plan --check"},
+      {"two results on standard output",
+       {"check", "--model", "${MODEL}", "--batch", "${BATCH}", "--report", "-"},
+       2,
+       "",
+       "--json"},
       // Services.
       {"no daemon", {"status", "--port", "17999", "--timeout", "0.3"}, 4, "", "*", 0, "trammel doctor"},
       {"a batch that is not there, for a daemon",

@@ -74,6 +74,13 @@ std::string check_text(const nlohmann::ordered_json& check) {
          due_text(check);
 }
 
+Status check_outputs(const CheckArguments& arguments) {
+  Outputs outputs;
+  outputs.add("--report", arguments.report);
+  outputs.add("--json", arguments.json);
+  return outputs.check({{"--model", arguments.model}, {"--batch", arguments.batch}});
+}
+
 Status write_report(const nlohmann::ordered_json& found, const HealthPageOf& of, const CheckArguments& arguments) {
   if (arguments.report.empty()) return {};
   return write_output(arguments.report, with_pages_beside(health_page(found.dump(), of), arguments.report));
@@ -191,7 +198,10 @@ void add_check_command(CLI::App& app, Action& chosen) {
   add_json_option(*command, arguments->json);
   add_service_options(*command, arguments->service);
   command->callback([arguments, &chosen] {
-    chosen = [arguments] { return arguments->service.service ? check_at_service(*arguments) : check(*arguments); };
+    chosen = [arguments]() -> Status {
+      if (const Status usable = check_outputs(*arguments); !usable) return usable;
+      return arguments->service.service ? check_at_service(*arguments) : check(*arguments);
+    };
   });
 }
 

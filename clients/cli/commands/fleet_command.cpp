@@ -56,6 +56,10 @@ Status fleet(const FleetArguments& arguments) {
   if (arguments.models.empty() == !arguments.service.service) {
     return failure(ErrorCode::kUsage, "either --model, once for each robot, or --service").of("--model");
   }
+  Outputs outputs;
+  outputs.add("--report", arguments.report);
+  outputs.add("--json", arguments.json);
+  if (const Status usable = outputs.check({}); !usable) return usable;
   const Result<ordered_json> json =
       arguments.service.service ? fleet_of_service(arguments) : fleet_of_files(arguments.models);
   if (!json) return tl::make_unexpected(json.error());
