@@ -212,6 +212,12 @@ void ignore_what_calls_report() {
   }
 }
 
+/// Cells that are served already stay as they are.
+void add_cells(const ServedCells& cells, DdsService& service, Trainer& trainer) {
+  for (const std::string& notice : trainer.add_cells(cells)) tell(LogLevel::kWarn, "notice", notice);
+  if (const Status told = service.cells_added(); !told) tell(LogLevel::kWarn, "notice", sentence(told.error()));
+}
+
 /// Reads the server file again and takes on what can change while it serves. Of a file that is refused nothing is
 /// taken.
 void reload(const std::string& path, ServerConfig& config, DdsService& service, Trainer& trainer) {
@@ -228,6 +234,7 @@ void reload(const std::string& path, ServerConfig& config, DdsService& service, 
     service.set_limits(config.dds);
     service.set_replica(config.dds.replica);
     trainer.set_limits(config.trainer.queue_capacity, config.trainer.keep);
+    if (config.cells.size() > trainer.cells().size()) add_cells(config.cells, service, trainer);
     tell(LogLevel::kInfo, "reloaded",
          plan.now.empty() ? "read again: nothing has changed"
                           : fmt::format("read again, and taken on: {}", fmt::join(plan.now, ", ")));

@@ -15,12 +15,23 @@ void leave(const char* key, const Value& present, const Value& file, std::vector
   if (present != file) later->emplace_back(key);
 }
 
-void leave_cells(const ServerConfig& present, const ServerConfig& file, std::vector<std::string>* later) {
-  for (const auto& [name, cell] : file.cells) {
-    if (!present.cells.contains(name)) later->push_back(fmt::format("cells: {}", name));
+bool same_files(const Cell& a, const Cell& b) { return a.cell_yaml == b.cell_yaml && a.robot_yaml == b.robot_yaml; }
+
+void take_cells(ServedCells& present, const ServedCells& file, ReloadPlan* plan) {
+  for (const auto& [name, cell] : file) {
+    if (present.contains(name)) continue;
+    const bool has_room = present.size() < kMaxCells;
+    (has_room ? plan->now : plan->later).push_back(fmt::format("cells: {}", name));
+    if (has_room) present[name] = cell;
   }
-  for (const auto& [name, cell] : present.cells) {
-    if (!file.cells.contains(name)) later->push_back(fmt::format("cells: {} (left out)", name));
+}
+
+void leave_cells(const ServedCells& present, const ServedCells& file, std::vector<std::string>* later) {
+  for (const auto& [name, cell] : present) {
+    const auto found = file.find(name);
+    if (found == file.end()) later->push_back(fmt::format("cells: {} (left out)", name));
+    if (found != file.end() && !same_files(*cell, *found->second))
+      later->push_back(fmt::format("cells: {} (its file)", name));
   }
 }
 
@@ -29,6 +40,7 @@ void leave_cells(const ServerConfig& present, const ServerConfig& file, std::vec
 ReloadPlan plan_reload(const ServerConfig& present, const ServerConfig& file) {
   ReloadPlan plan{present, {}, {}};
   ServerConfig& now = plan.config;
+  take_cells(now.cells, file.cells, &plan);
   take("log: level", now.log.level, file.log.level, &plan.now);
   take("log: format", now.log.format, file.log.format, &plan.now);
   take("dds: client_requests", now.dds.client_requests, file.dds.client_requests, &plan.now);
@@ -64,7 +76,7 @@ ReloadPlan plan_reload(const ServerConfig& present, const ServerConfig& file) {
   leave("trainer: memory_mb", present.trainer.compute.memory_mb, file.trainer.compute.memory_mb, &plan.later);
   leave("trainer: cpu_s", present.trainer.compute.cpu_s, file.trainer.compute.cpu_s, &plan.later);
   leave("log: file", present.log.file, file.log.file, &plan.later);
-  leave_cells(present, file, &plan.later);
+  leave_cells(present.cells, file.cells, &plan.later);
   return plan;
 }
 

@@ -15,10 +15,9 @@
 namespace trammel {
 namespace {
 
-constexpr std::size_t kMaxCells = 1024;  // of one server on the wire
-constexpr std::size_t kMaxName = 64;     // likewise, bytes
-constexpr int kLeastMemory = 64;         // MiB, of a job: what the program itself takes, and something to compute with
-constexpr int kMaxDomain = 232;          // above it the port numbers of DDS overflow
+constexpr std::size_t kMaxName = 64;  // likewise, bytes
+constexpr int kLeastMemory = 64;      // MiB, of a job: what the program itself takes, and something to compute with
+constexpr int kMaxDomain = 232;       // above it the port numbers of DDS overflow
 
 int integer_within(const YamlMap& map, const std::string& key, int otherwise, int lower, int upper) {
   const int value = map.integer(key, otherwise);

@@ -14,6 +14,8 @@
 
 namespace trammel {
 
+constexpr std::size_t kMaxCells = 1024;  // of one server on the wire
+
 /// The configuration of a server.
 struct ServerConfig {
   std::map<std::string, std::shared_ptr<const Cell>> cells;  ///< by name

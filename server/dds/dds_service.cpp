@@ -199,11 +199,16 @@ class DdsService::Running {
 
   void publish_model(const std::string& cell) {
     {
-      const MutexLock lock(publishing_.at(cell));  // the last model published must be the one in force
+      const MutexLock lock(publishing_of(cell));  // the last model published must be the one in force
       if (const auto model = registry_.in_force(cell)) topics_.publish(*model, options_.server_id);
     }
     events_->status_changed();
     if (replicas_) replicas_->changed();
+  }
+
+  [[nodiscard]] Status cells_added() {
+    events_->status_changed();
+    return replicas_ ? replicas_->cells_added() : Status();
   }
 
   void set_replica(const ReplicaOptions& options) {
@@ -262,9 +267,7 @@ class DdsService::Running {
         corrections_(compute_limits(options), room_),
         reads_(limits_of_reads(options), room_, kBehindComputing),
         changes_(limits_of_changes(options), room_, kBehindComputing),
-        core_{options.server_id, *participant_, subscriber, trainer, handlers_, channels_} {
-    for (const auto& [name, cell] : trainer.cells()) publishing_[name];
-  }
+        core_{options.server_id, *participant_, subscriber, trainer, handlers_, channels_} {}
 
   Status open_endpoints() {
     const auto open = [this]<typename Operation>(Operation, Lanes lanes) -> Status {
@@ -298,6 +301,11 @@ class DdsService::Running {
     if (!endpoint) return tl::make_unexpected(endpoint.error());
     endpoints_.push_back(std::move(*endpoint));
     return {};
+  }
+
+  [[nodiscard]] Mutex& publishing_of(const std::string& cell) {
+    const MutexLock lock(publishing_mutex_);
+    return publishing_[cell];
   }
 
   [[nodiscard]] std::array<Lane*, 4> lanes() { return {&predictions_, &corrections_, &reads_, &changes_}; }
@@ -382,7 +390,9 @@ class DdsService::Running {
   ServiceCore core_;
   std::unique_ptr<RequestRecorder> recorder_;  // null: nothing is recorded
   std::unique_ptr<ReplicaLink> replicas_;      // null: it knows of no others
-  std::map<std::string, Mutex> publishing_;    // by cell, the map never changes; a cell publishes one model at a time
+  Mutex publishing_mutex_;
+  std::map<std::string, Mutex> publishing_
+      TRAMMEL_GUARDED_BY(publishing_mutex_);  // by cell, nothing leaves it; a cell publishes one model at a time
   std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
   std::unique_ptr<OldContract> old_contract_;
   std::atomic<std::uint64_t> status_steps_{0};
@@ -450,6 +460,12 @@ void DdsService::set_limits(const DdsOptions& options) {
 
 void DdsService::set_replica(const ReplicaOptions& options) {
   while_running([&](Running& running) { running.set_replica(options); });
+}
+
+Status DdsService::cells_added() {
+  Status told;
+  while_running([&](Running& running) { told = running.cells_added(); });
+  return told;
 }
 
 ServiceFigures DdsService::figures() {

@@ -52,6 +52,9 @@ class DdsService {
 
   /// From now on these limits of what may wait; of the rest of the options nothing changes.
   void set_limits(const DdsOptions& options);
+  /// The trainer serves more cells: clients and other servers are told. Refused: what others have put in force for them
+  /// comes with the next change only. Call it from one thread.
+  [[nodiscard]] Status cells_added();
   /// The part that the server file gives it now (ReplicaRole::told()).
   void set_replica(const ReplicaOptions& options);
   /// What was done since start(); nothing where it does not run.

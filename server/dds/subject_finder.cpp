@@ -22,8 +22,9 @@ std::optional<int> version_number(const std::string& model) {
 }  // namespace
 
 Result<std::shared_ptr<const Cell>> SubjectFinder::cell(const wire::Context& context) const {
-  const auto found = trainer_.cells().find(context.cell());
-  if (found == trainer_.cells().end()) {
+  const ServedCells& cells = trainer_.cells();
+  const auto found = cells.find(context.cell());
+  if (found == cells.end()) {
     return failure(ErrorCode::kNotFound, "cell `{}` is not served here", context.cell())
         .of("cell")
         .with_text(context.cell());

@@ -88,7 +88,7 @@ bool is_same(const Opponents& a, const Opponents& b) {
 
 }  // namespace
 
-JobRunner::JobRunner(const ServedCells& cells, Store& store, const ModelRegistry& registry, ModelHistory& history,
+JobRunner::JobRunner(const CellBook& cells, Store& store, const ModelRegistry& registry, ModelHistory& history,
                      ProgressBook& book, const TrainerOptions& options)
     : cells_(cells), store_(store), registry_(registry), history_(history), book_(book), options_(options) {}
 
@@ -108,7 +108,7 @@ JobRunner::Attempt JobRunner::attempt(std::int64_t id, const StopRequests& stop)
   const auto failed = [](const Error& error) { return tl::make_unexpected(Failed{error, verdict_of(error)}); };
   const auto job = store_.job(id);
   if (!job) return failed(job.error());
-  const auto cell = find_cell(cells_, job->cell);
+  const auto cell = find_cell(cells_.now(), job->cell);
   if (!cell) return failed(cell.error());
   const Status running = once_the_disk_lets(id, stop, [&] { return store_.set_job_running(id); });
   if (!running) return failed(running.error());
@@ -145,7 +145,7 @@ JobRunner::Attempt JobRunner::compute(const StoredJob& job, const std::optional<
 
 Result<ComputeTask> JobRunner::task_of(const StoredJob& job, const std::optional<StoredDiagnosis>& asked) const {
   ComputeTask task;
-  task.cell = cells_.at(job.cell);
+  task.cell = cells_.now().at(job.cell);
   task.kind = job.kind;
   task.batch_ids = job.batch_ids;
   task.level = job.level;
@@ -188,11 +188,11 @@ Result<bool> JobRunner::learns_alone(const StoredJob& job, bool came_with_batch)
 /// From the models in force of other cells with robots of its type; empty where the cell does not want it, or where
 /// they are too few.
 std::optional<FleetPrior> JobRunner::fleet_prior_of(const StoredJob& job) const {
-  const Cell& cell = *cells_.at(job.cell);
+  const Cell& cell = *cells_.now().at(job.cell);
   const auto rules = rules_of(cell);
   if (job.kind != JobKind::kTrain || !rules || !rules->fleet_prior) return std::nullopt;
   std::vector<FleetMember> twins;
-  for (const auto& [name, other] : cells_) {
+  for (const auto& [name, other] : cells_.now()) {
     if (name == job.cell || !same_type(other->robot, cell.robot)) continue;
     if (const auto served = registry_.in_force(name)) twins.push_back({name, served->model});
   }

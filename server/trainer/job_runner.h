@@ -9,9 +9,9 @@
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/acceptance/model_history.h"
+#include "server/trainer/cell_book.h"
 #include "server/trainer/compute/compute_process.h"
 #include "server/trainer/job_progress.h"
-#include "server/trainer/served_cells.h"
 #include "server/trainer/trainer_options.h"
 
 namespace trammel {
@@ -24,7 +24,7 @@ constexpr int kMaxAttempts = 3;  // of one job whose computing, or the process, 
 class JobRunner {
  public:
   /// The references outlive it.
-  JobRunner(const ServedCells& cells, Store& store, const ModelRegistry& registry, ModelHistory& history,
+  JobRunner(const CellBook& cells, Store& store, const ModelRegistry& registry, ModelHistory& history,
             ProgressBook& book, const TrainerOptions& options);
 
   enum class End {
@@ -78,7 +78,7 @@ class JobRunner {
   [[nodiscard]] std::function<bool(const std::string&, double)> reporter(const StoredJob& job,
                                                                          const StopRequests& stop);
 
-  const ServedCells& cells_;
+  const CellBook& cells_;
   Store& store_;
   const ModelRegistry& registry_;
   ModelHistory& history_;

@@ -79,11 +79,12 @@ void Trainer::set_listeners(ProgressListener progress, ModelListener model, Trou
 Result<std::vector<std::string>> Trainer::take_up() {
   TRAMMEL_CHECK(!worker_.joinable() && !taken_up_);
   std::vector<std::string> notices;
-  for (const auto& [name, cell] : cells_) {
+  for (const auto& [name, cell] : cells()) {
     if (auto announced = history_.announce_from_store(name); !announced) notices.push_back(sentence(announced.error()));
   }
   const auto until = std::chrono::steady_clock::now() + kLoadingAtStart;
-  for (auto cell = cells_.begin(); cell != cells_.end() && std::chrono::steady_clock::now() < until; ++cell)
+  const ServedCells& served = cells();
+  for (auto cell = served.begin(); cell != served.end() && std::chrono::steady_clock::now() < until; ++cell)
     static_cast<void>(registry_.in_force(cell->first));  // what fails is among the troubles
   for (const std::string& trouble : troubles()) notices.push_back(trouble);
   auto unfinished = store_.unfinished_jobs();
@@ -107,7 +108,7 @@ Result<std::vector<std::string>> Trainer::take_up() {
 }
 
 Result<bool> Trainer::can_take_up(const StoredJob& job, std::vector<std::string>& notices) {
-  if (!cells_.contains(job.cell)) {
+  if (!cells().contains(job.cell)) {
     notices.push_back(fmt::format("job {} waits: cell {} is not served here", job.id, job.cell));
     return false;
   }
@@ -178,15 +179,35 @@ void Trainer::keep_up(std::vector<std::string> told, const std::stop_token& stop
   registry_.stop_loading();
 }
 
+std::vector<std::string> Trainer::add_cells(const ServedCells& more) {
+  const MutexLock lock(submit_mutex_);
+  const ServedCells& before = cells();
+  // Looked at before they are served: none of these jobs can end meanwhile.
+  std::vector<StoredJob> jobs = store_.unfinished_jobs().value_or(std::vector<StoredJob>());
+  std::erase_if(jobs, [&](const StoredJob& job) { return before.contains(job.cell) || !more.contains(job.cell); });
+  cells_.add(more);
+  std::vector<std::string> notices;
+  for (const auto& [name, cell] : more) {
+    if (before.contains(name)) continue;
+    if (auto announced = history_.announce_from_store(name); !announced) notices.push_back(sentence(announced.error()));
+  }
+  take_up_jobs(std::move(jobs), notices);
+  return notices;
+}
+
 void Trainer::take_up_late() {
-  for (const auto& [name, cell] : cells_) {
+  for (const auto& [name, cell] : cells()) {
     const std::vector<int> versions = store_.versions_to_serve(name);
     if (!versions.empty() && versions.front() != registry_.version_in_force(name))
       registry_.announce(name, versions.front());
   }
   const MutexLock lock(submit_mutex_);
   std::vector<std::string> notices;  // the next start says them again
-  for (StoredJob& job : store_.unfinished_jobs().value_or(std::vector<StoredJob>())) {
+  take_up_jobs(store_.unfinished_jobs().value_or(std::vector<StoredJob>()), notices);
+}
+
+void Trainer::take_up_jobs(std::vector<StoredJob> jobs, std::vector<std::string>& notices) {
+  for (StoredJob& job : jobs) {
     if (book_.find(job.id) || !can_take_up(job, notices).value_or(false)) continue;
     job.state = JobState::kQueued;
     enqueue(job, was_asked_for(job).value_or(true));
@@ -227,7 +248,7 @@ void Trainer::stop() {
 
 Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::string& batch_id, const std::string& csv,
                                      const std::string& request_id, const std::string& who) {
-  const auto cell = find_cell(cells_, cell_name);
+  const auto cell = find_cell(cells(), cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (auto valid = check_batch_id(batch_id); !valid) return tl::make_unexpected(valid.error());
   StoredJob job;
@@ -264,7 +285,7 @@ Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::
 
 Result<std::int64_t> Trainer::check(const std::string& cell_name, const std::string& batch_id, const std::string& csv,
                                     std::optional<double> tolerance_mm, const ChangeId& id) {
-  if (find_cell(cells_, cell_name) && !registry_.in_force(cell_name))
+  if (find_cell(cells(), cell_name) && !registry_.in_force(cell_name))
     return failure(ErrorCode::kNotFound, "cell {} has no model in force to hold a check against", cell_name).of("cell");
   StoredJob job;
   job.kind = JobKind::kCheck;
@@ -276,7 +297,7 @@ Result<std::int64_t> Trainer::check(const std::string& cell_name, const std::str
 Result<std::int64_t> Trainer::look_at(StoredJob job, const std::string& batch_id, const std::string& csv, bool apply,
                                       const ChangeId& id) {
   const std::string& cell_name = job.cell;
-  const auto cell = find_cell(cells_, cell_name);
+  const auto cell = find_cell(cells(), cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (!batch_id.empty() && !csv.empty()) {
     return failure(ErrorCode::kUsage, "a {} is of a stored batch or of one that is sent, not of both",
@@ -324,7 +345,7 @@ Result<std::string> Trainer::batch_to_diagnose(const std::string& cell_name, con
 Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::vector<std::string>& batch_ids,
                                       const std::string& level, const std::string& bias, Quarantine quarantine,
                                       const ChangeId& id) {
-  const auto cell = find_cell(cells_, cell_name);
+  const auto cell = find_cell(cells(), cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (const Status known = check_spellings(**cell, level, bias); !known) return tl::make_unexpected(known.error());
   if (const Status fits = check_most("batches", batch_ids.size(), kMostBatches, "batches in one training"); !fits)
@@ -425,7 +446,7 @@ Status Trainer::activate(const std::string& cell, int version, const ChangeReque
 
 Result<std::optional<GateVerdict>> Trainer::judged_import(const std::string& cell_name, int version) const {
   const std::optional<GateVerdict> nothing_to_judge;
-  const auto cell = find_cell(cells_, cell_name);
+  const auto cell = find_cell(cells(), cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   const auto present = registry_.in_force(cell_name);
   const auto judged_here = store_.was_made_by_job(cell_name, version);
@@ -465,18 +486,18 @@ Status Trainer::check_not_worse(const std::string& cell, int version, const Gate
 }
 
 Status Trainer::release(const std::string& cell_name, const std::string& batch_id, const ChangeId& id) {
-  if (const auto found = find_cell(cells_, cell_name); !found) return tl::make_unexpected(found.error());
+  if (const auto found = find_cell(cells(), cell_name); !found) return tl::make_unexpected(found.error());
   return store_.set_quarantine(cell_name, batch_id, "", id);
 }
 
 Status Trainer::discard(const std::string& cell_name, const std::string& batch_id, const ChangeId& id) {
-  if (const auto found = find_cell(cells_, cell_name); !found) return tl::make_unexpected(found.error());
+  if (const auto found = find_cell(cells(), cell_name); !found) return tl::make_unexpected(found.error());
   return store_.discard(cell_name, batch_id, id);
 }
 
 Result<std::vector<StoredBatch>> Trainer::batches(const std::string& cell_name) const {
   std::vector<StoredBatch> all;
-  for (const auto& [name, known] : cells_) {
+  for (const auto& [name, known] : cells()) {
     if (!cell_name.empty() && name != cell_name) continue;
     auto batches = store_.batches(name);
     if (!batches) return batches;

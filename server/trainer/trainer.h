@@ -14,10 +14,10 @@
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/acceptance/model_history.h"
+#include "server/trainer/cell_book.h"
 #include "server/trainer/job_progress.h"
 #include "server/trainer/job_queue.h"
 #include "server/trainer/job_runner.h"
-#include "server/trainer/served_cells.h"
 #include "server/trainer/trainer_options.h"
 
 namespace trammel {
@@ -54,7 +54,11 @@ class Trainer {
   /// Asks the running training to give up (its job stays queued in the store) and joins.
   void stop();
 
-  [[nodiscard]] const ServedCells& cells() const { return cells_; }
+  /// Stays as it is until the end; the next call may give more cells.
+  [[nodiscard]] const ServedCells& cells() const { return cells_.now(); }
+  /// From now on these cells are served too, with what the store has of them: the model in force, and the jobs that
+  /// wait. Returns what could not be taken up, for the log. Thread-safe.
+  [[nodiscard]] std::vector<std::string> add_cells(const ServedCells& more);
   /// From now on TrainerOptions::queue_capacity and TrainerOptions::keep are these. Thread-safe.
   void set_limits(int queue_capacity, const KeepRule& keep);
   /// What is wrong now: with the store, with its disk, with the models of cells; one sentence each. Never waits.
@@ -153,6 +157,8 @@ class Trainer {
   void prune(const std::string& cell, const std::stop_token& stop);
   /// Of a store that can be read only now.
   void take_up_late();
+  /// Those of cells that are served, as far as they do not wait here already.
+  void take_up_jobs(std::vector<StoredJob> jobs, std::vector<std::string>& notices) TRAMMEL_REQUIRES(submit_mutex_);
   void tell_troubles(std::vector<std::string>& told);
   /// Refuses (kBusy) where as many jobs that were asked for wait for this cell as may.
   [[nodiscard]] Status check_room(const std::string& cell) const;
@@ -179,7 +185,7 @@ class Trainer {
   [[nodiscard]] Result<std::string> batch_to_diagnose(const std::string& cell, const std::string& batch_id,
                                                       bool apply) const;
 
-  const ServedCells cells_;
+  CellBook cells_;
   Store& store_;
   ModelRegistry& registry_;
   const TrainerOptions options_;

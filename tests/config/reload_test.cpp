@@ -33,7 +33,7 @@ TEST(Reload, TakesOnLimitsAndTheLogAndNamesWhatHasChanged) {
 
 TEST(Reload, LeavesAndNamesWhatChangesWithTheNextStartOnly) {
   ServerConfig file = config();
-  file.cells = {{"cell-8", test::small_cell("cell-8")}};
+  file.cells.clear();
   file.dds.compute_workers = 9;
   file.trainer.max_poses = 11;
   file.log.file = "elsewhere.log";
@@ -41,9 +41,35 @@ TEST(Reload, LeavesAndNamesWhatChangesWithTheNextStartOnly) {
   EXPECT_TRUE(plan.now.empty());
   EXPECT_EQ(plan.config.dds.compute_workers, config().dds.compute_workers);
   EXPECT_TRUE(plan.config.cells.contains("cell-7"));
-  EXPECT_FALSE(plan.config.cells.contains("cell-8"));
   EXPECT_EQ(plan.later, (std::vector<std::string>{"dds: compute_workers", "trainer: max_poses", "log: file",
-                                                  "cells: cell-8", "cells: cell-7 (left out)"}));
+                                                  "cells: cell-7 (left out)"}));
+}
+
+TEST(Reload, TakesOnCellsThatAreAddedAndKeepsTheOthersAsTheyAre) {
+  ServerConfig file = config();
+  Cell changed = *file.cells.at("cell-7");
+  changed.robot_yaml += "# another robot\n";
+  file.cells["cell-7"] = std::make_shared<const Cell>(changed);
+  file.cells["cell-8"] = test::small_cell("cell-8");
+  const ServerConfig present = config();
+  const ReloadPlan plan = plan_reload(present, file);
+  EXPECT_EQ(plan.now, (std::vector<std::string>{"cells: cell-8"}));
+  EXPECT_EQ(plan.later, (std::vector<std::string>{"cells: cell-7 (its file)"}));
+  EXPECT_EQ(plan.config.cells.at("cell-7"), present.cells.at("cell-7"));
+  EXPECT_EQ(plan.config.cells.at("cell-8"), file.cells.at("cell-8"));
+}
+
+TEST(Reload, CellsForWhichTheWireHasNoRoomComeWithTheNextStart) {
+  const auto cell = test::small_cell("cell-7");
+  ServerConfig present = config(), file = config();
+  for (int i = 0; i < 1023; ++i) present.cells[fmt::format("old-{}", i)] = cell;
+  file.cells = present.cells;
+  file.cells.erase("old-0");
+  file.cells["new"] = cell;
+  const ReloadPlan plan = plan_reload(present, file);
+  EXPECT_TRUE(plan.now.empty());
+  EXPECT_EQ(plan.later, (std::vector<std::string>{"cells: new", "cells: old-0 (left out)"}));
+  EXPECT_EQ(plan.config.cells.size(), 1024u);
 }
 
 TEST(Reload, OptionsOfTheCommandLineAreNoChange) {

@@ -3,6 +3,7 @@
 #include <signal.h>
 
 #include <atomic>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -105,6 +106,32 @@ class ReplicasTest : public testing::Test {
   std::vector<std::string> files_;
   std::unique_ptr<client::Session> session_;
 };
+
+TEST_F(ReplicasTest, AFollowerThatTakesOnACellGetsTheModelThatTheWriterHasHadForLong) {
+  std::string other = test::read_file(std::filesystem::path(first_.config_path()).replace_filename("cell-7.yaml"));
+  other.replace(other.find("cell: cell-7"), 12, "cell: cell-8");
+  for (const int which : {0, 1}) {
+    const std::filesystem::path server_file = daemon(which).config_path();
+    ASSERT_TRUE(write_text_file(std::filesystem::path(server_file).replace_filename("cell-8.yaml"), other));
+  }
+  const auto name_cells = [this](std::size_t which, const std::string& before, const std::string& now) {
+    files_[which].replace(files_[which].find(before), before.size(), now);
+  };
+  name_cells(0, "[cell-7.yaml]", "[cell-7.yaml, cell-8.yaml]");
+  name_cells(1, "[cell-7.yaml]", "[cell-8.yaml]");
+  give_usual_parts();
+  start_both();
+  learn("lt-1", 1);
+  name_cells(1, "[cell-8.yaml]", "[cell-8.yaml, cell-7.yaml]");
+  give_usual_parts();
+  second_.process().signal(SIGHUP);
+  ASSERT_TRUE(second_.process().wait_for_line("taken on: cells: cell-7", kLimit)) << second_.process().standard_error();
+  ASSERT_TRUE(wait_until(same)) << second_.process().standard_error();
+  first_.kill();
+  const auto answer = session_->predict_error(kContext, test::virtual_joints(3, 7));
+  ASSERT_TRUE(answer) << sentence(answer.error());
+  EXPECT_EQ(answer->model.version, 1);
+}
 
 TEST_F(ReplicasTest, AFollowerServesWhatTheWriterPutInForceAlsoAfterItsOwnRestart) {
   give_usual_parts();

@@ -7,9 +7,11 @@
 #include <unistd.h>
 
 #include <array>
+#include <atomic>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <thread>
 
 #include "server/base/text_file.h"
 #include "tests/support/daemon.h"
@@ -136,6 +138,106 @@ TEST_F(WatchingTest, AReloadTakesOnWhatCanChangeAndAFileThatIsRefusedChangesNoth
   EXPECT_EQ(last.find('{', last.rfind('\n', last.size() - 2) + 1), last.rfind('\n', last.size() - 2) + 1)
       << "still JSON";
   EXPECT_EQ(get("/healthz").code, 200);
+  EXPECT_EQ(daemon_.stop(), 0);
+}
+
+/// Its server file names other cells while it serves.
+class ReloadOfCellsTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    server_file_ = test::read_file(daemon_.config_path());
+    cell_file_ = test::read_file(file("cell-7.yaml"));
+    std::string cell_8 = cell_file_;
+    cell_8.replace(cell_8.find("cell: cell-7"), 12, "cell: cell-8");
+    ASSERT_TRUE(write_text_file(file("cell-8.yaml"), cell_8));
+    daemon_.start();
+    session_ = open_session();
+    learn("cell-7", "lt-07");
+  }
+  [[nodiscard]] std::string file(const std::string& name) const {
+    return std::filesystem::path(daemon_.config_path()).replace_filename(name);
+  }
+  [[nodiscard]] std::unique_ptr<client::Session> open_session() const {
+    auto opened = client::Session::open(daemon_.session_options());
+    EXPECT_TRUE(opened) << sentence(opened.error());
+    return std::move(*opened);
+  }
+  void name_cells(const std::string& cells) {
+    std::string text = server_file_;
+    text.replace(text.find("[cell-7.yaml]"), 13, cells);
+    ASSERT_TRUE(write_text_file(daemon_.config_path(), text));
+  }
+  /// The server file names these cells from now on; until the daemon says `line` of it.
+  void reload(const std::string& cells, const std::string& line) {
+    name_cells(cells);
+    daemon_.process().signal(SIGHUP);
+    ASSERT_TRUE(daemon_.process().wait_for_line(line, kLimit)) << daemon_.process().standard_error();
+  }
+  void learn(const std::string& cell, const std::string& batch) {
+    const auto job = session_->submit_measurements(cell, batch, test::virtual_batch_csv(40, 1));
+    ASSERT_TRUE(job) << sentence(job.error());
+    const auto over = session_->wait_for_job(*job, seconds(120), nullptr);
+    ASSERT_TRUE(over) << sentence(over.error());
+    ASSERT_EQ(over->stage, "done") << over->what;
+  }
+  /// Of the model that answers; 0: none does.
+  [[nodiscard]] static int version(client::Session& session, const std::string& cell) {
+    client::CallContext context;
+    context.cell = cell;
+    const auto answer = session.predict_error(context, test::virtual_joints(3, 7));
+    return answer ? answer->model.version : 0;
+  }
+  [[nodiscard]] std::string status() const {
+    const auto said = test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "status", "--port",
+                                 std::to_string(daemon_.port()), "--domain", std::to_string(daemon_.domain())});
+    EXPECT_EQ(said.exit_code, 0) << said.err;
+    return said.out;
+  }
+
+  std::string server_file_, cell_file_;
+  test::Daemon daemon_;
+  std::unique_ptr<client::Session> session_;
+};
+
+TEST_F(ReloadOfCellsTest, ANewCellIsServedAtOnceAndWhoAsksForTheOthersLosesNothing) {
+  std::atomic<int> answered = 0, lost = 0;
+  std::jthread asks([&, other = open_session()](const std::stop_token& stop) {
+    while (!stop.stop_requested()) ++(version(*other, "cell-7") == 1 ? answered : lost);
+  });
+  EXPECT_EQ(status().find("cell-8"), std::string::npos);
+  reload("[cell-7.yaml, cell-8.yaml]", "taken on: cells: cell-8");
+  EXPECT_NE(status().find("cell-8"), std::string::npos) << status();
+  EXPECT_EQ(version(*session_, "cell-8"), 0) << "there is no model";
+  learn("cell-8", "lt-08");
+  EXPECT_EQ(version(*session_, "cell-8"), 1);
+  asks = {};
+  EXPECT_GT(answered, 100);
+  EXPECT_EQ(lost, 0);
+  EXPECT_EQ(daemon_.stop(), 0);
+}
+
+TEST_F(ReloadOfCellsTest, ACellThatIsLeftOutIsServedUntilTheNextStartAndComesBackWithItsModel) {
+  reload("[cell-8.yaml]", "cells: cell-7 (left out) changes with the next start only");
+  ASSERT_TRUE(daemon_.process().wait_for_line("taken on: cells: cell-8", kLimit));
+  EXPECT_EQ(version(*session_, "cell-7"), 1);
+  EXPECT_EQ(daemon_.stop(), 0);
+  daemon_.start();
+  session_ = open_session();
+  EXPECT_EQ(version(*session_, "cell-7"), 0);
+  reload("[cell-8.yaml, cell-7.yaml]", "taken on: cells: cell-7");
+  EXPECT_EQ(version(*session_, "cell-7"), 1);
+  EXPECT_EQ(daemon_.stop(), 0);
+}
+
+TEST_F(ReloadOfCellsTest, ABrokenCellFileIsNamedAndChangesNothingAndAChangedOneComesWithTheNextStart) {
+  ASSERT_TRUE(write_text_file(file("cell-9.yaml"), "version: 1\ncell: cell-9\nrobot: nowhere.yaml\n"));
+  reload("[cell-7.yaml, cell-8.yaml, cell-9.yaml]", "everything stays as it was");
+  EXPECT_TRUE(daemon_.process().wait_for_line("nowhere.yaml", kLimit)) << daemon_.process().standard_error();
+  EXPECT_EQ(status().find("cell-8"), std::string::npos);
+  EXPECT_EQ(version(*session_, "cell-7"), 1);
+  ASSERT_TRUE(write_text_file(file("cell-7.yaml"), cell_file_ + "# moved\n"));
+  reload("[cell-7.yaml]", "cells: cell-7 (its file) changes with the next start only");
+  EXPECT_EQ(version(*session_, "cell-7"), 1);
   EXPECT_EQ(daemon_.stop(), 0);
 }
 

@@ -90,11 +90,8 @@ Status ReplicaLink::open_endpoints(wire::dds::DomainParticipant& participant, wi
       [this](const wire::ReplicaStatus* sample, const std::string& from, double) { on_status(sample, from); });
   if (!statuses) return tl::make_unexpected(statuses.error());
   status_reader_ = std::move(*statuses);
-  auto models = wire::StateReader<wire::ModelSnapshotTopic>::open(
-      Result<wire::dds::Topic*>(&snapshots), subscriber_, wire::state_reader_qos(),
-      [this](const wire::ModelSnapshot* sample, const std::string&, double) { on_snapshot(sample); });
-  if (!models) return tl::make_unexpected(models.error());
-  snapshot_reader_ = std::move(*models);
+  snapshots_topic_ = &snapshots;
+  if (const Status listens = listen_to_snapshots(); !listens) return listens;
   auto copies = wire::StateReader<wire::BatchCopyTopic>::open(
       topic_of(copy_writer_), subscriber_, wire::call_reader_qos(wire::kRequestDepth),
       [this](const wire::BatchCopy* sample, const std::string& from, double) { on_copy(sample, from); });
@@ -106,6 +103,24 @@ Status ReplicaLink::open_endpoints(wire::dds::DomainParticipant& participant, wi
   if (!answers) return tl::make_unexpected(answers.error());
   copied_reader_ = std::move(*answers);
   return {};
+}
+
+Status ReplicaLink::listen_to_snapshots() {
+  auto models = wire::StateReader<wire::ModelSnapshotTopic>::open(
+      Result<wire::dds::Topic*>(snapshots_topic_), subscriber_, wire::state_reader_qos(),
+      [this](const wire::ModelSnapshot* sample, const std::string&, double) { on_snapshot(sample); });
+  if (!models) return tl::make_unexpected(models.error());
+  snapshot_reader_ = std::move(*models);
+  return {};
+}
+
+Status ReplicaLink::cells_added() {
+  {
+    const MutexLock lock(mutex_);
+    for (const auto& [server, heard] : heard_) behind_.insert(server);
+  }
+  wake();
+  return listen_to_snapshots();
 }
 
 void ReplicaLink::wake() {
@@ -125,7 +140,8 @@ void ReplicaLink::on_status(const wire::ReplicaStatus* status, const std::string
     } else if (const std::string name = status->server().to_string(); name != server_) {
       Heard& heard = heard_[name];
       const bool follows_anew = heard.status.follows().to_string() != status->follows().to_string();
-      if (heard.participant != participant || follows_anew) behind_.insert(name);
+      const bool has_more_cells = heard.status.cells().size() < status->cells().size();
+      if (heard.participant != participant || follows_anew || has_more_cells) behind_.insert(name);
       heard = {participant, *status, Clock::now()};
     }
   }

@@ -48,6 +48,8 @@ class ReplicaLink {
   void copy_batch(const std::string& cell, const std::string& batch_id, const std::string& csv);
   /// What is in force has changed here: it is told.
   void changed() { wake(); }
+  /// The trainer serves more cells: what other servers have of them is asked for again. Call it from one thread.
+  [[nodiscard]] Status cells_added();
   /// The server file was read again.
   void set_options(const ReplicaOptions& options);
 
@@ -69,6 +71,8 @@ class ReplicaLink {
   ReplicaLink(wire::dds::Subscriber& subscriber, std::string server, const ReplicaOptions& options, Trainer& trainer,
               Store& store, ReplicaListener listener);
   [[nodiscard]] Status open_endpoints(wire::dds::DomainParticipant& participant, wire::dds::Topic& snapshots);
+  /// What was published before comes once more.
+  [[nodiscard]] Status listen_to_snapshots();
   /// False: the store does not let the part be remembered yet.
   [[nodiscard]] bool begin();
 
@@ -115,6 +119,7 @@ class ReplicaLink {
   Trainer& trainer_;
   Store& store_;
   const ReplicaListener listener_;
+  wire::dds::Topic* snapshots_topic_ = nullptr;
   wire::dds::Publisher* publisher_ = nullptr;
   wire::dds::DataWriter* status_writer_ = nullptr;
   wire::dds::DataWriter* copy_writer_ = nullptr;

@@ -30,9 +30,8 @@ JobOutcome outcome_of(const GateVerdict& verdict) {
 
 }  // namespace
 
-ModelHistory::ModelHistory(const ServedCells& cells, Store& store, ModelRegistry& registry)
+ModelHistory::ModelHistory(const CellBook& cells, Store& store, ModelRegistry& registry)
     : cells_(cells), store_(store), registry_(registry) {
-  for (const auto& [name, cell] : cells_) changing_[name];
   registry_.set_source({[this](const std::string& cell) { return load_in_force(cell); },
                         [this](const std::string& cell, int version) {
                           return load_for_service(cell, version).map([&](CompensatedModel model) {
@@ -42,6 +41,11 @@ ModelHistory::ModelHistory(const ServedCells& cells, Store& store, ModelRegistry
                         [this](const ServedModelPtr& model) {
                           if (listener_) listener_(*model, true);
                         }});
+}
+
+Mutex& ModelHistory::changes_of(const std::string& cell) {
+  const MutexLock lock(changing_mutex_);
+  return changing_[cell];
 }
 
 ModelHistory::~ModelHistory() { registry_.set_source({}); }
@@ -61,7 +65,8 @@ Result<ServedModel> ModelHistory::load_in_force(const std::string& cell) {
       if (!why_not) why_not = model.error();
       continue;
     }
-    const auto fits = check_fits_cell(*model, *cells_.at(cell), fmt::format("version {} of cell {}", version, cell));
+    const auto fits =
+        check_fits_cell(*model, *cells_.now().at(cell), fmt::format("version {} of cell {}", version, cell));
     if (!fits) {
       set_trouble(cell, CellTrouble{CellTrouble::Kind::kOfAnotherRobot, sentence(fits.error())});
       return tl::make_unexpected(fits.error());
@@ -106,7 +111,8 @@ void ModelHistory::set_trouble(const std::string& cell, const std::optional<Cell
 Result<CompensatedModel> ModelHistory::load_for_service(const std::string& cell, int version) const {
   auto model = store_.model(cell, version);
   if (!model) return model;
-  const Status fits = check_fits_cell(*model, *cells_.at(cell), fmt::format("version {} of cell {}", version, cell));
+  const Status fits =
+      check_fits_cell(*model, *cells_.now().at(cell), fmt::format("version {} of cell {}", version, cell));
   if (!fits) return tl::make_unexpected(fits.error());
   return model;
 }
@@ -124,7 +130,7 @@ Status ModelHistory::check_expected(const std::string& cell, const ChangeRequest
 
 Status ModelHistory::activate(const std::string& cell, int version, const ChangeRequest& request,
                               const std::optional<GateVerdict>& judged) {
-  if (auto found = find_cell(cells_, cell); !found) return tl::make_unexpected(found.error());
+  if (auto found = find_cell(cells_.now(), cell); !found) return tl::make_unexpected(found.error());
   const auto made = store_.outcome_of(request.id);
   if (!made) return tl::make_unexpected(made.error());
   if (*made) return {};
@@ -162,7 +168,7 @@ Result<std::pair<int, ServedModelPtr>> ModelHistory::load_first(const std::strin
 }
 
 Result<int> ModelHistory::rollback(const std::string& cell, const ChangeRequest& request) {
-  if (auto found = find_cell(cells_, cell); !found) return tl::make_unexpected(found.error());
+  if (auto found = find_cell(cells_.now(), cell); !found) return tl::make_unexpected(found.error());
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
     const auto made = store_.outcome_of(request.id);
     if (!made) return tl::make_unexpected(made.error());
@@ -186,7 +192,7 @@ Result<int> ModelHistory::rollback(const std::string& cell, const ChangeRequest&
 
 Result<CompensatedModel> ModelHistory::model_from(const std::string& cell, const std::string& text,
                                                   const char* what) const {
-  const auto served = find_cell(cells_, cell);
+  const auto served = find_cell(cells_.now(), cell);
   if (!served) return tl::make_unexpected(served.error());
   auto model = deserialize(text, what);
   if (!model) return model;
@@ -211,7 +217,7 @@ Result<int> ModelHistory::adopt(const std::string& cell, const VersionInForce& d
       return refused("cell {}: its hash is {}, not {} as told", cell, read->provenance().hash, decided.hash).of("hash");
     model = std::move(*read);
   }
-  if (const auto served = find_cell(cells_, cell); !served) return tl::make_unexpected(served.error());
+  if (const auto served = find_cell(cells_.now(), cell); !served) return tl::make_unexpected(served.error());
   const MutexLock lock(changes_of(cell));
   if (decides_) return failure(ErrorCode::kConflict, "cell {}: this server decides itself", cell).of("cell");
   const auto version = store_.adopt(cell, decided, model ? &*model : nullptr, by);
@@ -244,7 +250,7 @@ Result<int> ModelHistory::import_model(const std::string& cell, const std::strin
 
 GateVerdict ModelHistory::within_step_limit(GateVerdict verdict, const Candidate& candidate,
                                             const ServedModel* present) const {
-  const std::optional<double>& limit = cells_.at(candidate.job.cell)->step_limit;
+  const std::optional<double>& limit = cells_.now().at(candidate.job.cell)->step_limit;
   if (!verdict.put_in_force || present == nullptr || !limit) return verdict;
   const auto step = farthest_step(present->model, candidate.model, recent_poses_.of(candidate.job.cell));
   if (!step || *step <= *limit) return verdict;

@@ -16,7 +16,7 @@
 #include "server/trainer/acceptance/gate.h"
 #include "server/trainer/acceptance/recent_poses.h"
 #include "server/trainer/acceptance/verdict.h"
-#include "server/trainer/served_cells.h"
+#include "server/trainer/cell_book.h"
 
 namespace trammel {
 
@@ -66,8 +66,8 @@ class ModelHistory {
   /// that cell can happen: it must not call back into what changes models.
   using Listener = std::function<void(const ServedModel&, bool in_force)>;
 
-  /// `store` and `registry` outlive it. It is where the registry's models come from.
-  ModelHistory(const ServedCells& cells, Store& store, ModelRegistry& registry);
+  /// What is given outlives it. It is where the registry's models come from.
+  ModelHistory(const CellBook& cells, Store& store, ModelRegistry& registry);
   ~ModelHistory();
   ModelHistory(const ModelHistory&) = delete;
   ModelHistory& operator=(const ModelHistory&) = delete;
@@ -118,7 +118,7 @@ class ModelHistory {
   /// A model file from elsewhere for this cell.
   [[nodiscard]] Result<CompensatedModel> model_from(const std::string& cell, const std::string& text,
                                                     const char* what) const;
-  [[nodiscard]] Mutex& changes_of(const std::string& cell) { return changing_.at(cell); }
+  [[nodiscard]] Mutex& changes_of(const std::string& cell);
   /// Of a model that the store has put in force; the cell's lock is held.
   void put_in_force(ServedModelPtr model);
   /// What the cell is to be served with.
@@ -158,14 +158,16 @@ class ModelHistory {
   [[nodiscard]] GateVerdict within_step_limit(GateVerdict verdict, const Candidate& candidate,
                                               const ServedModel* present) const;
 
-  const ServedCells cells_;
+  const CellBook& cells_;
   Store& store_;
   ModelRegistry& registry_;
   Listener listener_;
   std::atomic<bool> decides_ = true;
   RecentPoses recent_poses_;
-  std::map<std::string, Mutex> changing_;  // the map never changes; one change of a cell's models at a time
-  mutable Mutex troubles_mutex_;           // taken last
+  Mutex changing_mutex_;
+  std::map<std::string, Mutex> changing_
+      TRAMMEL_GUARDED_BY(changing_mutex_);  // nothing leaves it; one change of a cell's models at a time
+  mutable Mutex troubles_mutex_;            // taken last
   std::map<std::string, CellTrouble> troubles_ TRAMMEL_GUARDED_BY(troubles_mutex_);  // by cell
 };
 
