@@ -476,6 +476,22 @@ TEST_F(TrainerTest, AJobOfACellThatIsNotServedHereWaits) {
   EXPECT_EQ(trainer_->queued_jobs(), 0);
 }
 
+TEST_F(TrainerTest, ACellThatIsAddedWhileItServesIsTrainedFromTheJobsThatWaitedForIt) {
+  const std::int64_t job = submit("lt-07");
+  const ServedCells added = cells_;
+  cells_ = {{"cell-8", test::small_cell("cell-8")}};
+  restart();
+  ASSERT_TRUE(trainer_->start());
+  const ServedCells& before = trainer_->cells();
+  EXPECT_TRUE(trainer_->add_cells(added).empty());
+  EXPECT_TRUE(trainer_->add_cells(added).empty()) << "a second time changes nothing";
+  EXPECT_EQ(before.size(), 1u) << "whoever reads it still may";
+  EXPECT_EQ(trainer_->cells().size(), 2u);
+  EXPECT_TRUE(watch_.wait_until_finished(job).in_force);
+  EXPECT_EQ(registry_->version_in_force("cell-7"), 1);
+  EXPECT_TRUE(trainer_->submit("cell-7", "lt-08", test::small_batch_csv(*added.at("cell-7"), {.seed = 2}), "client:2"));
+}
+
 TEST_F(TrainerTest, ServesWhatWasInForceAfterARestart) {
   start();
   train("lt-07");
