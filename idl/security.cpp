@@ -1,16 +1,22 @@
 #include "idl/security.h"
 
 #include <openssl/bio.h>
+#include <openssl/err.h>
+#include <openssl/objects.h>
 #include <openssl/pem.h>
 #include <openssl/pkcs7.h>
 #include <openssl/x509.h>
 #include <openssl/x509_vfy.h>
 #include <sys/stat.h>
 
+#include <algorithm>
+#include <array>
+#include <charconv>
 #include <ctime>
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "server/base/text_file.h"
 
@@ -27,6 +33,7 @@ struct Free {
 using Bio = std::unique_ptr<BIO, Free<BIO_free_all>>;
 using Certificate = std::unique_ptr<X509, Free<X509_free>>;
 using RevocationList = std::unique_ptr<X509_CRL, Free<X509_CRL_free>>;
+using Name = std::unique_ptr<X509_NAME, Free<X509_NAME_free>>;
 using Key = std::unique_ptr<EVP_PKEY, Free<EVP_PKEY_free>>;
 using Signed = std::unique_ptr<PKCS7, Free<PKCS7_free>>;
 using Authorities = std::unique_ptr<X509_STORE, Free<X509_STORE_free>>;
@@ -62,11 +69,13 @@ class Folder {
   std::string path_;
 };
 
-std::string subject_of(const X509& certificate) {
+std::string text_of(const X509_NAME& name) {
   const Bio out(BIO_new(BIO_s_mem()));
-  X509_NAME_print_ex(out.get(), X509_get_subject_name(&certificate), 0, XN_FLAG_RFC2253);
+  X509_NAME_print_ex(out.get(), &name, 0, XN_FLAG_RFC2253);
   return text_of(out.get());
 }
+
+std::string subject_of(const X509& certificate) { return text_of(*X509_get_subject_name(&certificate)); }
 
 /// The authority of identities with the revocation lists behind it.
 Result<Authorities> identity_authority(const Folder& folder) {
@@ -152,7 +161,79 @@ Status check_permissions(const Folder& folder, const std::string& subject, const
   return {};
 }
 
+struct NamePart {
+  std::string key, value;
+};
+
+/// The parts of `/O=Works/CN=cam-7`. A `/` that begins no part belongs to the value before it.
+std::vector<NamePart> name_parts(const std::string& line) {
+  std::vector<NamePart> parts;
+  for (std::size_t at = 0; at < line.size();) {
+    const std::size_t end = std::min(line.find('/', at + 1), line.size()), equals = line.find('=', at);
+    const std::string key = equals < end ? line.substr(at + 1, equals - at - 1) : std::string();
+    if (line[at] == '/' && OBJ_txt2nid(key.c_str()) != NID_undef) {
+      parts.push_back({key, line.substr(equals + 1, end - equals - 1)});
+    } else if (!parts.empty()) {
+      parts.back().value += line.substr(at, end - at);
+    }
+    at = end;
+  }
+  return parts;
+}
+
+/// Octets beyond ASCII are written `\xC3`.
+std::string unescaped(const std::string& text) {
+  std::string octets;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    unsigned octet = 0;
+    const char* hex = text.data() + i + 2;
+    const bool is_escaped = text.compare(i, 2, "\\x") == 0 && i + 4 <= text.size() &&
+                            std::from_chars(hex, hex + 2, octet, 16).ptr == hex + 2;
+    octets += is_escaped ? static_cast<char>(octet) : text[i];
+    if (is_escaped) i += 3;
+  }
+  return octets;
+}
+
+/// As authorities write a name: `type` is how OpenSSL encodes its texts. Null: it cannot be.
+Name name_of(const std::vector<NamePart>& parts, int type) {
+  Name name(X509_NAME_new());
+  for (const NamePart& part : parts) {
+    const std::string value = unescaped(part.value);
+    const auto* octets = reinterpret_cast<const unsigned char*>(value.data());
+    const int size = static_cast<int>(value.size());
+    if (X509_NAME_add_entry_by_txt(name.get(), part.key.c_str(), type, octets, size, -1, 0) != 1) return nullptr;
+  }
+  return name;
+}
+
+/// As DDS-Security has GUIDs begin: a bit that is set, and 47 bits of the hash of the subject.
+bool begins_with_hash(const std::string& participant, const X509_NAME& name) {
+  std::array<unsigned char, EVP_MAX_MD_SIZE> hash{};
+  unsigned length = 0;
+  if (participant.size() < 6 || X509_NAME_digest(&name, EVP_sha256(), hash.data(), &length) != 1) return false;
+  unsigned carried = 1;
+  for (std::size_t i = 0; i < 6; ++i) {
+    const unsigned expected = (carried << 7 | unsigned{hash[i]} >> 1) & 0xFF;
+    if (static_cast<unsigned char>(participant[i]) != expected) return false;
+    carried = hash[i];
+  }
+  return true;
+}
+
 }  // namespace
+
+std::string confirmed_subject(const std::string& claimed, const std::string& participant) {
+  constexpr std::size_t kLongest = 512;
+  if (claimed.size() > kLongest) return {};
+  const std::vector<NamePart> parts = name_parts(claimed);
+  for (const int type : {MBSTRING_UTF8, V_ASN1_PRINTABLESTRING, V_ASN1_UTF8STRING}) {
+    const Name name = name_of(parts, type);
+    if (name && begins_with_hash(participant, *name)) return text_of(*name);
+  }
+  ERR_clear_error();
+  return {};
+}
 
 Result<Security> read_security(const std::string& path) {
   const Folder folder(path);

@@ -20,4 +20,9 @@ struct Security {
 /// whose permissions are for another subject, have expired or are not valid yet.
 [[nodiscard]] Result<Security> read_security(const std::string& folder);
 
+/// The subject of the certificate that a participant has shown, as RFC 2253 writes it. `claimed`: what its identity
+/// token says (`dds.cert.sn`), which nobody has checked. `participant`: the 12 octets of its GUID, which begin with a
+/// hash of the subject that the library has held against the certificate. Empty: the two do not fit.
+[[nodiscard]] std::string confirmed_subject(const std::string& claimed, const std::string& participant);
+
 }  // namespace trammel::wire

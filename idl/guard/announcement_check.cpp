@@ -74,9 +74,11 @@ bool skip_items(Reader& value, const Skip& skip) {
 
 bool skip_property(Reader& value) { return skip_string(value) && skip_string(value); }
 bool skip_binary_property(Reader& value) { return skip_string(value) && skip_octets(value); }
-bool skip_token(Reader& value) {
-  return skip_string(value) && skip_items(value, skip_property) && skip_items(value, skip_binary_property);
+template <typename SkipBinary>
+bool skip_token_with(Reader& value, const SkipBinary& skip_binary) {
+  return skip_string(value) && skip_items(value, skip_property) && skip_items(value, skip_binary);
 }
+bool skip_token(Reader& value) { return skip_token_with(value, skip_binary_property); }
 
 /// A list of texts that the library reads until their NUL. Empty partition names have length 0 or 1.
 bool skip_partition(Reader& value) {
@@ -175,6 +177,31 @@ Next next_checked(Reader& list) {
   return {{}, Parameter{*id, *value}};
 }
 
+/// The GUID in an announcement as the handshake has it, which the library holds against the certificate, and against
+/// nothing else. `list` is big endian.
+bool announces(Reader list, Bytes source) {
+  while (true) {
+    const auto id = list.u16();
+    const auto length = list.u16();
+    if (!id || !length || *id == kSentinel) return false;
+    if (*id == kParticipantGuid || *id == kKeyHash) return list.rest().size() >= kGuid && is_of(list.rest(), source);
+    if (!list.take((std::size_t{*length} + 3) & ~std::size_t{3})) return false;
+  }
+}
+
+/// Of a binary property of the handshake, which fits.
+bool proves_no_other(Reader property, Bytes source) {
+  constexpr std::string_view kAnnouncement = "c.pdata";
+  Reader ahead = property;
+  const Bytes name = ahead.take(ahead.u32().value_or(0)).value_or(Bytes());
+  if (name.size() < kAnnouncement.size() || !std::equal(kAnnouncement.begin(), kAnnouncement.end(), name.begin()))
+    return true;
+  skip_string(property);
+  const auto length = property.u32();
+  return length && *length <= property.rest().size() &&
+         announces(Reader(property.rest().first(*length), false), source);
+}
+
 }  // namespace
 
 Fault check_inline_qos(Reader& rest, Bytes source, bool names_source, bool& says_status) {
@@ -218,12 +245,22 @@ Fault check_announcement(Bytes payload, Bytes source, EditedMessage& message, st
   }
 }
 
-Fault check_handshake(Bytes payload) {
+Fault check_handshake(Bytes payload, Bytes source) {
   constexpr std::size_t kIdentities = 24 + 24 + 16 + 16 + 16;  // two messages, three GUIDs
   if (payload.size() < 4 || payload[0] != 0 || payload[1] > 1) return Dropped::kParameters;
   Reader reader(payload.subspan(4), payload[1] == 1);
-  const bool fits = reader.take(kIdentities) && skip_string(reader) && skip_items(reader, skip_token);
-  return fits ? Fault() : Dropped::kParameters;
+  const auto identities = reader.take(kIdentities);
+  if (!identities) return Dropped::kParameters;
+  bool is_own = is_of(*identities, source);
+  const auto skip_binary = [&](Reader& value) {
+    const Bytes property = value.rest();
+    if (!skip_binary_property(value)) return false;
+    is_own = is_own && proves_no_other(Reader(property, value.little_endian()), source);
+    return true;
+  };
+  const auto skip = [&](Reader& value) { return skip_token_with(value, skip_binary); };
+  if (!skip_string(reader) || !skip_items(reader, skip)) return Dropped::kParameters;
+  return is_own ? Fault() : Dropped::kSource;
 }
 
 }  // namespace trammel::wire

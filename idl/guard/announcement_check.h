@@ -20,8 +20,9 @@ namespace trammel::wire {
 [[nodiscard]] std::optional<Dropped> check_announcement(Bytes payload, Bytes source, EditedMessage& message,
                                                         std::uint32_t& lease_seconds);
 
-/// The payload of a message of the authentication handshake, which comes before anybody is known.
-[[nodiscard]] std::optional<Dropped> check_handshake(Bytes payload);
+/// The payload of a message of the authentication handshake, which comes before anybody is known. It is of `source`,
+/// and so is the announcement within: the library compares that with the certificate, and not with who speaks.
+[[nodiscard]] std::optional<Dropped> check_handshake(Bytes payload, Bytes source);
 
 inline constexpr std::uint32_t kLongestLeaseSeconds = 120;
 inline constexpr std::uint32_t kUsualLeaseSeconds = 100;  // RTPS 2.2, table 9.12

@@ -12,7 +12,7 @@ namespace {
 constexpr std::uint32_t kPublications = 0x000003c2, kSubscriptions = 0x000004c2, kLiveliness = 0x000200c2;
 constexpr std::uint32_t kSecureAnnouncer = 0xff0101c2, kSecurePublications = 0xff0003c2,
                         kSecureSubscriptions = 0xff0004c2, kSecureLiveliness = 0xff0200c2;
-constexpr std::uint32_t kHandshake = 0x000201c3;
+constexpr std::uint32_t kHandshake = 0x000201c3, kHandshakeReader = 0x000201c4;
 constexpr std::uint32_t kBuiltIn = 0xc0;  // in the last octet of an entity id
 constexpr std::uint32_t kMostBits = 256;
 constexpr std::uint32_t kMostHistory = 1u << 24;  // samples that a HEARTBEAT may offer
@@ -153,7 +153,9 @@ std::optional<Dropped> MessageCheck::check_data(const Submessage& submessage) {
   }
   if (!payload && !key) return says_status ? Fault() : Fault(Dropped::kLength);
   if (after.rest().size() < 4) return Dropped::kLength;
-  return payload ? check_announced(head->writer, after.rest()) : Fault();
+  if (!payload) return {};
+  const bool handshake = head->writer == kHandshake || head->reader == kHandshakeReader;
+  return handshake ? check_handshake(after.rest(), source_) : check_announced(head->writer, after.rest());
 }
 
 std::optional<Dropped> MessageCheck::check_announced(std::uint32_t writer, Bytes payload) {
@@ -162,7 +164,6 @@ std::optional<Dropped> MessageCheck::check_announced(std::uint32_t writer, Bytes
     if (const Fault fault = check_announcement(payload, source_, edited_, lease_seconds)) return fault;
   }
   if (is_liveliness_writer(writer) && payload.size() < 24) return Dropped::kLength;
-  if (writer == kHandshake) return check_handshake(payload);
   if (writer != kAnnouncer) return {};
   const MutexLock lock(memory_.mutex);
   return memory_.participants.announced(source_, received_.socket, std::chrono::seconds(lease_seconds), received_.now);

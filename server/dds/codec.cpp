@@ -375,10 +375,6 @@ void put_error(const ChangesElsewhere& elsewhere, wire::ReplyHeader& header) {
   header.problems().front().code(wire::RESULT_UNSUPPORTED);
 }
 
-ChangeId change_id(const std::string& id, const std::string& asked, const wire::RequestHeader& header) {
-  return {id, asked, requester(header)};
-}
-
 std::string requester(const wire::RequestHeader& header) {
   constexpr std::size_t kOfParticipant = 12;  // octets of a GUID
   std::string text = "client ";

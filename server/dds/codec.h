@@ -37,9 +37,7 @@ namespace trammel {
 [[nodiscard]] wire::TargetStatus to_wire(CorrectionStatus status);
 [[nodiscard]] wire::ResultCode to_wire(ErrorCode code);
 
-/// What makes a change happen once: the client's id of it with what is asked for; without an id only who asks.
-[[nodiscard]] ChangeId change_id(const std::string& id, const std::string& asked, const wire::RequestHeader& header);
-/// Who sent the request, for the audit trail: the DDS participant of its writer, and its trace.
+/// Which DDS participant sent the request, and its trace.
 [[nodiscard]] std::string requester(const wire::RequestHeader& header);
 /// What is asked for, in one line: the verb, the cell, and a hash of all the rest.
 [[nodiscard]] std::string in_few_words(const std::string& verb, const std::string& cell,

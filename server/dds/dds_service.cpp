@@ -161,6 +161,7 @@ class DdsService::Running {
     running->recorder_ = std::move(*recorder);
     running->core_.recorder = running->recorder_.get();
     running->handlers_.set_replicas(running->replicas_.get());
+    running->handlers_.set_names(&running->events_->names());
     if (const Status opened = running->open_endpoints(); !opened) return tl::make_unexpected(opened.error());
     for (Lane* lane : running->lanes()) lane->start();
     running->replies_thread_ =

@@ -11,8 +11,8 @@ Result<wire::DiagnoseReply> Handlers::answer(const wire::DiagnoseRequest& reques
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
   const auto job = trainer_.diagnose(
       cell, request.batch_id(), request.csv(), false,
-      change_id(request.change_id().to_string(), in_few_words("diagnose", cell, {request.batch_id(), request.csv()}),
-                request.header()));
+      ChangeId{request.change_id().to_string(), in_few_words("diagnose", cell, {request.batch_id(), request.csv()}),
+               who(request.header())});
   if (!job) return tl::make_unexpected(job.error());
   wire::DiagnoseReply reply;
   if (const auto served = registry_.in_force(cell)) reply.model(to_wire(*served, true, unix_now_s()));
@@ -30,8 +30,8 @@ Result<wire::CheckHealthReply> Handlers::answer(const wire::CheckHealthRequest& 
   }
   const auto job =
       trainer_.check(cell, request.batch_id(), request.csv(), tolerance,
-                     change_id(request.change_id().to_string(),
-                               in_few_words("check", cell, {request.batch_id(), request.csv()}), request.header()));
+                     ChangeId{request.change_id().to_string(),
+                              in_few_words("check", cell, {request.batch_id(), request.csv()}), who(request.header())});
   if (!job) return tl::make_unexpected(job.error());
   wire::CheckHealthReply reply;
   if (const auto served = registry_.in_force(cell)) reply.model(to_wire(*served, true, unix_now_s()));

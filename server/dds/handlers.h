@@ -17,6 +17,7 @@
 
 namespace trammel {
 
+class ClientNames;
 class ReplicaLink;
 
 /// What a request is about, looked up once. The whole answer comes from this one model.
@@ -56,6 +57,10 @@ class Handlers {
 
   /// Who the other servers of the same cells are; null: nobody. It outlives the requests. Set before there are any.
   void set_replicas(ReplicaLink* replicas) { replicas_ = replicas; }
+  /// The names of clients; null: nobody has one. They outlive the requests. Set before there are any.
+  void set_names(const ClientNames* names) { names_ = names; }
+  /// The subject of the certificate of a DDS participant; empty: it has shown none.
+  [[nodiscard]] std::string name_of(const std::string& participant) const;
   /// Whether another server makes changes; empty: this one.
   [[nodiscard]] std::optional<ChangesElsewhere> changes_elsewhere() const;
 
@@ -81,6 +86,8 @@ class Handlers {
   [[nodiscard]] Result<wire::ReleaseBatchesReply> answer(const wire::ReleaseBatchesRequest& request);
 
  private:
+  /// Who sent the request, for the audit trail: the name, the participant, the trace.
+  [[nodiscard]] std::string who(const wire::RequestHeader& header) const;
   /// The job.
   [[nodiscard]] Result<std::int64_t> trained(const wire::TrainRequest& request);
   /// The version activated, gone back to or imported; 0: none.
@@ -111,6 +118,7 @@ class Handlers {
   const ModelRegistry& registry_;
   SubjectFinder subjects_;
   ReplicaLink* replicas_ = nullptr;
+  const ClientNames* names_ = nullptr;
   WorkCounts work_;  // requests refer to it, and end before it
 };
 

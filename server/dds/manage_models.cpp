@@ -22,7 +22,7 @@ Result<int> Handlers::changed(const std::string& cell, const wire::ManageModelsR
   const auto expected = expected_version(request.change());
   if (!expected) return tl::make_unexpected(expected.error());
   const auto under = [&](const std::string& asked) {
-    ChangeId id = change_id(request.change().id().to_string(), asked, request.header());
+    ChangeId id{request.change().id().to_string(), asked, who(request.header())};
     id.reason = request.reason();
     return ChangeRequest{std::move(id), *expected};
   };
@@ -36,7 +36,7 @@ Result<int> Handlers::changed(const std::string& cell, const wire::ManageModelsR
       return trainer_.import_model(cell, text, id);
     }
     case wire::MANAGE_CANCEL_JOB:
-      return cancel(cell, request.job(), requester(request.header())).map([] { return 0; });
+      return cancel(cell, request.job(), who(request.header())).map([] { return 0; });
     default:
       return trainer_
           .activate(cell, request.version(), under(fmt::format("activate {}@{}", cell, request.version())),
@@ -75,13 +75,12 @@ Result<std::int64_t> Handlers::released(const std::string& cell, const wire::Rel
         .of("batch_ids")
         .beyond(batches.size(), 1);
   }
-  ChangeId id =
-      change_id(request.change().id().to_string(),
-                in_few_words(trains     ? "release and train"
-                             : discards ? "discard"
-                                        : "release",
-                             cell, {fmt::format("{}", fmt::join(batches, "\n")), request.level(), request.bias()}),
-                request.header());
+  ChangeId id{request.change().id().to_string(),
+              in_few_words(trains     ? "release and train"
+                           : discards ? "discard"
+                                      : "release",
+                           cell, {fmt::format("{}", fmt::join(batches, "\n")), request.level(), request.bias()}),
+              who(request.header())};
   id.reason = request.reason();
   id.expected_version = *expected;
   if (discards) return trainer_.discard(cell, batches.front(), id).map([] { return std::int64_t{0}; });

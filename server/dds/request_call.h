@@ -259,9 +259,10 @@ class Call final : public Job {
     const bool changes = happens_once(*request_);
     if (!context_.listener || (is_good && !changes)) return;
     const wire::RequestHeader& header = request_->header();
-    context_.listener({Operation::kName, participant_text(to_.participant), request_id_text(header.request_id()),
-                       header.trace_id().to_string(), request_->about().cell(), changes, reply_.header().message(),
-                       result_word(reply_.header().result())});
+    const std::string name = context_.handlers.name_of(to_.participant);
+    context_.listener({Operation::kName, name.empty() ? participant_text(to_.participant) : name,
+                       request_id_text(header.request_id()), header.trace_id().to_string(), request_->about().cell(),
+                       changes, reply_.header().message(), result_word(reply_.header().result())});
   }
 
   /// Returns how many were answered: with the repeats that have come meanwhile.

@@ -9,6 +9,14 @@ namespace {
 /// Limit of readers noted between two calls of wait(); they are some milliseconds apart.
 constexpr std::size_t kMaxReaders = 4096;
 
+/// Who the participant says that it is; empty: it does not say.
+std::string claimed_subject(const eprosima::fastrtps::rtps::IdentityToken& token) {
+  for (const auto& property : token.properties()) {
+    if (property.name() == "dds.cert.sn") return property.value();
+  }
+  return {};
+}
+
 }  // namespace
 
 void ServiceEvents::status_changed() {
@@ -60,10 +68,15 @@ void ServiceEvents::on_subscriber_discovery(wire::dds::DomainParticipant*,
 void ServiceEvents::on_participant_discovery(wire::dds::DomainParticipant*,
                                              eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) {
   using Info = eprosima::fastrtps::rtps::ParticipantDiscoveryInfo;
-  if (info.status != Info::REMOVED_PARTICIPANT && info.status != Info::DROPPED_PARTICIPANT) return;
+  const std::string participant = wire::participant_of(info.info.m_guid);
+  if (info.status != Info::REMOVED_PARTICIPANT && info.status != Info::DROPPED_PARTICIPANT) {
+    names_.announced(participant, claimed_subject(info.info.identity_token_));
+    return;
+  }
+  names_.left(participant);
   {
     const MutexLock lock(mutex_);
-    left_.insert(wire::participant_of(info.info.m_guid));
+    left_.insert(participant);
   }
   changed_.notify_one();
 }
@@ -76,7 +89,12 @@ Strangers ServiceEvents::strangers() const {
 void ServiceEvents::onParticipantAuthentication(wire::dds::DomainParticipant*,
                                                 eprosima::fastrtps::rtps::ParticipantAuthenticationInfo&& info) {
   using Info = eprosima::fastrtps::rtps::ParticipantAuthenticationInfo;
-  if (info.status == Info::AUTHORIZED_PARTICIPANT) return;
+  const std::string participant = wire::participant_of(info.guid);
+  if (info.status == Info::AUTHORIZED_PARTICIPANT) {
+    names_.let_in(participant);
+    return;
+  }
+  names_.refused(participant);
   std::ostringstream guid;
   guid << info.guid.guidPrefix;
   const MutexLock lock(mutex_);

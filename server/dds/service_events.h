@@ -10,6 +10,7 @@
 
 #include "idl/transport.h"
 #include "server/base/mutex.h"
+#include "server/dds/client_names.h"
 #include "server/dds/schedule/channel_book.h"
 
 namespace trammel {
@@ -27,7 +28,7 @@ struct Strangers {
 };
 
 /// What the status thread of a service waits for. As the participant's listener it notes the readers of replies, and
-/// the participants that have left, and nothing else. Thread-safe.
+/// the participants that have left, and the names of those that were let in. Thread-safe.
 class ServiceEvents final : public wire::dds::DomainParticipantListener {
  public:
   /// The status is to be published.
@@ -44,6 +45,7 @@ class ServiceEvents final : public wire::dds::DomainParticipantListener {
   [[nodiscard]] News wait(const std::stop_token& stop, std::chrono::milliseconds limit);
 
   [[nodiscard]] Strangers strangers() const;
+  [[nodiscard]] const ClientNames& names() const { return names_; }
 
  private:
   void on_subscriber_discovery(wire::dds::DomainParticipant* participant,
@@ -53,6 +55,7 @@ class ServiceEvents final : public wire::dds::DomainParticipantListener {
   void onParticipantAuthentication(wire::dds::DomainParticipant* participant,
                                    eprosima::fastrtps::rtps::ParticipantAuthenticationInfo&& info) override;
 
+  ClientNames names_;
   mutable Mutex mutex_;
   Condition changed_;
   bool woken_ TRAMMEL_GUARDED_BY(mutex_) = false;

@@ -1,5 +1,6 @@
 #include <utility>
 
+#include "server/dds/client_names.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
 #include "server/dds/replicas/replica_link.h"
@@ -27,6 +28,17 @@ Status check_training(const wire::TrainRequest& request) {
 
 }  // namespace
 
+std::string Handlers::name_of(const std::string& participant) const {
+  return names_ == nullptr ? std::string() : names_->of(participant);
+}
+
+std::string Handlers::who(const wire::RequestHeader& header) const {
+  constexpr std::size_t kOfParticipant = 12;  // octets of a GUID
+  const auto& guid = header.request_id().writer_guid();
+  const std::string name = name_of({guid.begin(), guid.begin() + kOfParticipant});
+  return name.empty() ? requester(header) : name + " " + requester(header);
+}
+
 std::optional<ChangesElsewhere> Handlers::changes_elsewhere() const {
   return replicas_ == nullptr ? std::nullopt : replicas_->changes_elsewhere();
 }
@@ -38,7 +50,7 @@ Result<wire::SubmitMeasurementsReply> Handlers::answer(const wire::SubmitMeasure
       trainer_.submit(request.about().cell(), request.batch_id(), request.csv(),
                       request.change_id().to_string().empty() ? request_id_text(request.header().request_id())
                                                               : request.change_id().to_string(),
-                      requester(request.header()));
+                      who(request.header()));
   if (!job) return tl::make_unexpected(job.error());
   if (replicas_ != nullptr) replicas_->copy_batch(request.about().cell(), request.batch_id(), request.csv());
   wire::SubmitMeasurementsReply reply;
@@ -66,11 +78,11 @@ Result<std::int64_t> Handlers::trained(const wire::TrainRequest& request) {
   if (const Status sensible = check_training(request); !sensible) return tl::make_unexpected(sensible.error());
   const auto expected = expected_version(request.change());
   if (!expected) return tl::make_unexpected(expected.error());
-  ChangeId id = change_id(
+  ChangeId id{
       request.change().id().to_string(),
       in_few_words(diagnosed ? "diagnose and train" : "train", cell,
                    {fmt::format("{}", fmt::join(batches, "\n")), request.level(), request.bias(), request.csv()}),
-      request.header());
+      who(request.header())};
   id.expected_version = *expected;
   if (!diagnosed)
     return trainer_.retrain(cell, batches, request.level(), request.bias(), Trainer::Quarantine::kStays, id);

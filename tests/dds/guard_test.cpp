@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <optional>
 #include <random>
 #include <vector>
@@ -218,11 +219,18 @@ TEST(Guard, AParticipantThatIsNotHeardIsNotKeptForEver) {
   EXPECT_EQ(PacketBytes(passed->begin(), passed->end()), announcement(participant().add(0x0002, cut)));
 }
 
+/// How a handshake by `speaker` begins, little endian.
+PacketBytes identities(const Prefix& speaker) {
+  PacketBytes begin(4 + 96);
+  begin[1] = 1;
+  std::copy(speaker.begin(), speaker.end(), begin.begin() + 4);
+  return begin;
+}
+
 TEST(Guard, TheHandshakeOfStrangersIsReadBeforeTheLibraryReadsIt) {
   constexpr std::uint32_t kHandshake = 0x000201c3;
   const auto handshake = [](const std::vector<std::uint32_t>& words) {
-    PacketBytes payload = {0, 1, 0, 0};
-    payload.resize(payload.size() + 96);
+    PacketBytes payload = identities(kSource);
     for (const std::uint32_t word : words) test::put32(payload, word);
     return from().data({0x000201c4, kHandshake, 1, {}, payload}).bytes();
   };
@@ -230,6 +238,37 @@ TEST(Guard, TheHandshakeOfStrangersIsReadBeforeTheLibraryReadsIt) {
   EXPECT_EQ(fate(handshake({1, 0, 0xffffffffu})), Dropped::kParameters) << "tokens";
   EXPECT_EQ(fate(handshake({1, 0, 1, 1, 0, 0, 1, 1, 0, 0xffffffffu})), Dropped::kParameters) << "binary value";
   EXPECT_EQ(fate(handshake({0xfffffff0u})), Dropped::kParameters) << "class";
+}
+
+/// A handshake by kSource that says it is of `speaker`, and proves that the certificate is of `proven`.
+PacketBytes handshake_of(const Prefix& speaker, const PacketBytes& proven, std::uint32_t by = 0x000201c3) {
+  PacketBytes payload = identities(speaker);
+  for (const std::uint32_t word : {1, 0, 1, 1, 0, 0, 2}) test::put32(payload, word);  // class, token, two octet values
+  test::put_bytes(payload, {5, 0, 0, 0, 'c', '.', 'i', 'd', 0, 0, 0, 0, 0, 0, 0, 0});
+  test::put_bytes(payload, {8, 0, 0, 0, 'c', '.', 'p', 'd', 'a', 't', 'a', 0});
+  test::put32(payload, static_cast<std::uint32_t>(proven.size()));
+  test::put_bytes(payload, proven);
+  return from().data({0x000201c4, by, 1, {}, payload}).bytes();
+}
+
+/// The library wants it big endian.
+PacketBytes announced_guid(std::uint16_t id, const Prefix& of) {
+  PacketBytes list(32);
+  const PacketBytes begin = {0, 0x15, 0, 4, 2, 3, 0, 0, 0, static_cast<unsigned char>(id), 0, 16};
+  std::copy(begin.begin(), begin.end(), list.begin());
+  std::copy(of.begin(), of.end(), list.begin() + 12);
+  list[29] = 1;  // the end
+  return list;
+}
+
+TEST(Guard, WhoShowsACertificateSpeaksForItselfAlone) {
+  EXPECT_EQ(fate(handshake_of(kSource, announced_guid(0x50, kSource))), kPasses);
+  EXPECT_EQ(fate(handshake_of(kOther, announced_guid(0x50, kSource))), Dropped::kSource) << "in another's handshake";
+  EXPECT_EQ(fate(handshake_of(kSource, announced_guid(0x50, kOther))), Dropped::kSource) << "own proof, other's GUID";
+  EXPECT_EQ(fate(handshake_of(kSource, announced_guid(0x70, kOther))), Dropped::kSource) << "by its key hash";
+  EXPECT_EQ(fate(handshake_of(kSource, announced_guid(0x05, kSource))), Dropped::kSource) << "without a GUID";
+  EXPECT_EQ(fate(handshake_of(kSource, announced_guid(0x50, kOther), kUserWriter)), Dropped::kSource)
+      << "by whichever writer";
 }
 
 TEST(Guard, FragmentsThatTheirSampleDoesNotHaveAreDropped) {

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "idl/topics.h"
@@ -212,6 +213,30 @@ TEST_F(SecurityTest, WhoseCertificateHasEndedMeanwhileIsNotLetInAgain) {
   const auto other = session(keys().of("cam", "cam-1"));
   ASSERT_TRUE(other) << other.error().message;
   EXPECT_TRUE((*other)->servers()) << "others are served";
+}
+
+TEST_F(SecurityTest, TheAuditTrailAndTheLogNameTheCertificate) {
+  std::string config = test::read_file(daemon_.config_path());
+  const std::size_t log = config.find("log: {") + 6;
+  ASSERT_TRUE(write_text_file(daemon_.config_path(), config.insert(log, "format: json, ")));
+  daemon_.start();
+  const auto name_in_audit = [&](const std::string& name, const std::string& batch) {
+    const auto opened = session(keys().of("engineer", name));
+    ASSERT_TRUE(opened) << opened.error().message;
+    const auto job = (*opened)->submit_measurements("cell-7", batch, test::virtual_batch_csv(80, batch[0]));
+    ASSERT_TRUE(job) << job.error().message;
+    const auto trail = (*opened)->audit("cell-7", 0, 100);
+    ASSERT_TRUE(trail) << trail.error().message;
+    const auto rows = nlohmann::json::parse(trail->at(0).json).at("rows");
+    const auto row =
+        std::find_if(rows.begin(), rows.end(), [&](const auto& r) { return r.at("subject") == "batch " + batch; });
+    ASSERT_NE(row, rows.end()) << rows.dump();
+    EXPECT_TRUE(daemon_.process().wait_for_line("\"who\":\"CN=" + name + ",O=Trammel\"", kLimit));
+    const std::string who = row->at("who");
+    EXPECT_TRUE(who.starts_with("CN=" + name + ",O=Trammel client ")) << who;
+  };
+  name_in_audit("engineer-1", "first");
+  name_in_audit("engineer-2", "second");
 }
 
 TEST_F(SecurityTest, AnswersDoNotGoToAPartitionOfSomebodyElseWhateverTheCertificateAllows) {
