@@ -115,7 +115,8 @@ TEST_F(ServerConfigTest, ReadsEveryKey) {
   const ServerConfig config = read(
       "models_in_memory_mb: 512\n"
       "dds: {domain: 3, address: 127.0.0.2, port: 18000, peer_ports: [18002, 18004], compute_workers: 4, "
-      "max_clients: 7, client_requests: 8, client_mb: 90, queued_requests: 10, queued_mb: 110, cell_share: 0.75, ros2: true}\n"
+      "max_clients: 7, client_requests: 8, client_mb: 90, queued_requests: 10, queued_mb: 110, cell_share: 0.75, ros2: "
+      "true}\n"
       "trainer: {queue_capacity: 2, max_poses: 300, validation_share: 0.3, accept_ratio: 1.5, seed: 9, memory_mb: 64, "
       "cpu_s: 30}\n"
       "log: {level: debug, file: trammel.log, format: json}\n"

@@ -16,9 +16,9 @@ TEST(FleetPage, SaysOfEachCellItsHealthItsNextCheckAndWhatItsTwinsSay) {
           {"cell": "b", "version": null, "health": {"verdict": "changed"}, "unlike_twins": []},
           {"cell": "c", "version": null, "health": null}], "types": [{"robot": "R", "robots": 3}]})");
   const std::string page = fleet_page(fleet, 1'763'942'400);
-  for (const char* part : {"a&lt;b&gt;", "0123 (version 3)", "cannot tell", "2026-12-01", "a2 is 0.3 mm longer",
-                           "like its twins", "not checked yet", "no model in force", "R: 3 robots", "2025-11-24",
-                           "3 robots: 1 changed, 1 not checked yet."})
+  for (const char* part :
+       {"a&lt;b&gt;", "0123 (version 3)", "cannot tell", "2026-12-01", "a2 is 0.3 mm longer", "like its twins",
+        "not checked yet", "no model in force", "R: 3 robots", "2025-11-24", "3 robots: 1 changed, 1 not checked yet."})
     EXPECT_TRUE(has(page, part)) << part << "\n" << page;
 }
 
