@@ -17,8 +17,8 @@ double unix_time_s() {
 }  // namespace
 
 Result<std::unique_ptr<ServerWatch>> ServerWatch::open(wire::dds::DomainParticipant& participant,
-                                                       wire::dds::Subscriber& subscriber) {
-  std::unique_ptr<ServerWatch> watch(new ServerWatch);
+                                                       wire::dds::Subscriber& subscriber, std::size_t named) {
+  std::unique_ptr<ServerWatch> watch(new ServerWatch(named));
   ServerWatch* self = watch.get();
   auto status = wire::StateReader<wire::ServiceStatusTopic>::open(
       participant, subscriber, wire::state_reader_qos(),
@@ -81,19 +81,6 @@ void ServerWatch::wait_for_first(MutexLock& lock, Clock::time_point deadline, co
   changed_.wait_until(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) { return found() || in_vain(); });
 }
 
-std::optional<KnownServer> ServerWatch::wait_for_server(const std::string& cell, const std::string& avoid,
-                                                        bool to_change, Clock::time_point deadline,
-                                                        const std::function<bool(const KnownServer&)>& reachable) {
-  MutexLock lock(mutex_);
-  const KnownServer* chosen = nullptr;
-  wait_for_first(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) {
-    chosen = choose(cell, avoid, to_change, reachable);
-    return chosen != nullptr;
-  });
-  if (chosen == nullptr) return std::nullopt;
-  return *chosen;
-}
-
 namespace {
 
 bool serves(const KnownServer& server, const std::string& cell) {
@@ -102,6 +89,28 @@ bool serves(const KnownServer& server, const std::string& cell) {
 }
 
 }  // namespace
+
+bool ServerWatch::is_settled(const KnownServer& chosen, const std::string& cell) const {
+  if (cell.empty() || serves(chosen, cell)) return true;
+  return servers_.size() >= named_ &&
+         std::none_of(servers_.begin(), servers_.end(), [&](const auto& entry) { return serves(entry.second, cell); });
+}
+
+std::optional<KnownServer> ServerWatch::wait_for_server(const std::string& cell, const std::string& avoid,
+                                                        bool to_change, Clock::time_point deadline,
+                                                        const std::function<bool(const KnownServer&)>& reachable) {
+  MutexLock lock(mutex_);
+  const KnownServer* chosen = nullptr;
+  const auto look = [&]() TRAMMEL_REQUIRES(mutex_) {
+    chosen = choose(cell, avoid, to_change, reachable);
+    return chosen != nullptr;
+  };
+  wait_for_first(lock, std::min(deadline, Clock::now() + wire::kStatusLost),
+                 [&]() TRAMMEL_REQUIRES(mutex_) { return look() && is_settled(*chosen, cell); });
+  if (chosen == nullptr) wait_for_first(lock, deadline, look);
+  if (chosen == nullptr) return std::nullopt;
+  return *chosen;
+}
 
 std::optional<KnownServer> ServerWatch::another_server(const std::string& cell, const std::string& avoid,
                                                        const std::function<bool(const KnownServer&)>& reachable) {

@@ -44,13 +44,15 @@ struct KnownModel {
 /// The servers that are there, and what they published on the state topics. Thread-safe.
 class ServerWatch {
  public:
+  /// `named`: how many servers the client names.
   [[nodiscard]] static Result<std::unique_ptr<ServerWatch>> open(wire::dds::DomainParticipant& participant,
-                                                                 wire::dds::Subscriber& subscriber);
+                                                                 wire::dds::Subscriber& subscriber, std::size_t named);
 
   /// Chooses among the servers that `reachable` accepts: preferably one that serves `cell`, then one that published its
   /// status lately, then one that is not `avoid`, then (`to_change`) the one that writes, then one that was not slower
   /// than another one lately (was_slow()). Waits until `deadline` for the first server, less long where all that
-  /// are there speak another contract.
+  /// are there speak another contract. One that does not serve the cell is taken only when no other can be expected:
+  /// all named servers are known, or kStatusLost is over.
   [[nodiscard]] std::optional<KnownServer> wait_for_server(const std::string& cell, const std::string& avoid,
                                                            bool to_change, Clock::time_point deadline,
                                                            const std::function<bool(const KnownServer&)>& reachable);
@@ -79,7 +81,7 @@ class ServerWatch {
                                                            std::uint64_t& seen, Clock::time_point deadline);
 
  private:
-  ServerWatch() = default;
+  explicit ServerWatch(std::size_t named) : named_(named) {}
   void on_old_status(const contract_1::ServiceStatus* status, const std::string& participant);
   /// Whether waiting for a server is in vain: those that are there speak another contract, and have been for a while.
   [[nodiscard]] bool in_vain() const TRAMMEL_REQUIRES(mutex_);
@@ -93,11 +95,14 @@ class ServerWatch {
   [[nodiscard]] const KnownServer* choose(const std::string& cell, const std::string& avoid, bool to_change,
                                           const std::function<bool(const KnownServer&)>& reachable) const
       TRAMMEL_REQUIRES(mutex_);
+  /// Whether `chosen` serves the cell, or no named server does.
+  [[nodiscard]] bool is_settled(const KnownServer& chosen, const std::string& cell) const TRAMMEL_REQUIRES(mutex_);
   /// Whether the part of every server that has one is known.
   [[nodiscard]] bool knows_all_parts() const TRAMMEL_REQUIRES(mutex_);
   /// Whether the models of every server are as many as it reports.
   [[nodiscard]] bool knows_all_models() const TRAMMEL_REQUIRES(mutex_);
 
+  const std::size_t named_;
   mutable Mutex mutex_;
   Condition changed_;
   std::map<std::string, OtherServer> others_ TRAMMEL_GUARDED_BY(mutex_);  // by participant

@@ -297,7 +297,7 @@ Result<std::unique_ptr<Session>> Session::open(const SessionOptions& asked) {
   if (inside->request_publisher == nullptr || inside->reply_subscriber == nullptr || states == nullptr) {
     return failure(ErrorCode::kInternal, "cannot create the publisher and the subscribers of a session");
   }
-  auto watch = ServerWatch::open(*inside->participant, *states);
+  auto watch = ServerWatch::open(*inside->participant, *states, inside->options.servers.size());
   if (!watch) return tl::make_unexpected(watch.error());
   inside->watch = std::move(*watch);
   return std::unique_ptr<Session>(new Session(std::move(inside)));

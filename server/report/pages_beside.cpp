@@ -1,5 +1,7 @@
 #include "server/report/pages_beside.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <filesystem>

@@ -136,7 +136,7 @@ TEST(Sentence, OfFilesThatCannotBeReadOrWritten) {
 
 TEST(Sentence, OfModelsThatAreSpelledWrong) {
   EXPECT_EQ(said(make_error_source("complience", *test::cell_7())).substr(0, 82),
-            "unknown error source 'complience', did you mean compliance?; known: compliance, ba");
+            "unknown error source 'complience', did you mean compliance?; levels are M0 to M3, ");
   EXPECT_EQ(said(check_bias_spelling("se +")), "bias kernel `se +`, character 5: a kernel is expected");
   EXPECT_EQ(said(check_bias_spelling("rbf")).substr(0, 64),
             "bias kernel `rbf`: `rbf` is unknown; known are none and auto (al");
