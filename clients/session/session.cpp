@@ -1,8 +1,10 @@
 #include "clients/session/session.h"
 
 #include <algorithm>
+#include <map>
 #include <optional>
 #include <random>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -21,6 +23,7 @@ namespace {
 /// is far below.
 constexpr double kShareOfTimeout = 0.1;
 constexpr std::chrono::milliseconds kJobPoll{2000};
+constexpr std::size_t kHomesRemembered = 1000;  // of a session's jobs
 constexpr std::chrono::milliseconds kLook{50};  // between two looks at what servers say
 constexpr int kReferrals = 4;                   // from server to server, of one request
 constexpr std::uint32_t kLeastPatience = 10;    // ms, before a busy server is asked again
@@ -110,6 +113,8 @@ struct Session::Participant {
              Endpoints<wire::Train>, Endpoints<wire::Diagnose>, Endpoints<wire::CheckHealth>,
              Endpoints<wire::ReadModels>, Endpoints<wire::ManageModels>, Endpoints<wire::ReleaseBatches>>
       endpoints;
+  Mutex homes_mutex;
+  std::map<std::int64_t, std::set<std::string>> homes TRAMMEL_GUARDED_BY(homes_mutex);  // this session's jobs' servers
 
   [[nodiscard]] Clock::time_point deadline() const { return Clock::now() + options.timeout; }
 
@@ -194,7 +199,7 @@ struct Session::Participant {
     request.reason(change.reason);
     const auto reply = call<wire::ReleaseBatches>(request, {cell, {}, true});
     if (!reply) return tl::make_unexpected(reply.error());
-    return reply->job();
+    return accepted(*reply);
   }
 
   /// From `server`; empty: any.
@@ -240,16 +245,50 @@ struct Session::Participant {
     return reply->jobs().front();
   }
 
-  /// The server that has the job, and its present state.
-  [[nodiscard]] Result<std::pair<std::string, wire::Job>> find_job(std::int64_t number) {
-    const auto known = watch->wait_for_servers(options.servers.size(), deadline());
-    Error last = no_server();
-    for (const KnownServer& server : known) {
-      auto found = job(server.id(), number);
-      if (found) return std::pair(server.id(), std::move(*found));
-      last = found.error();
+  /// The job that was accepted, and remembers by whom: every server counts its own jobs.
+  template <typename Reply>
+  [[nodiscard]] std::int64_t accepted(const Reply& reply) {
+    const MutexLock lock(homes_mutex);
+    homes[reply.job()].insert(reply.header().server().to_string());
+    if (homes.size() > kHomesRemembered) homes.erase(homes.begin());
+    return reply.job();
+  }
+  /// The job is over, as this session has been told.
+  void told(std::int64_t number, const std::string& server) {
+    const MutexLock lock(homes_mutex);
+    const auto found = homes.find(number);
+    if (found != homes.end() && found->second.erase(server) > 0 && found->second.empty()) homes.erase(found);
+  }
+  /// The servers that accepted a job of this number in this session, and have not told its end; without one all that
+  /// are known.
+  [[nodiscard]] std::set<std::string> may_have(std::int64_t number) {
+    {
+      const MutexLock lock(homes_mutex);
+      if (const auto found = homes.find(number); found != homes.end()) return found->second;
     }
-    return tl::make_unexpected(last);
+    std::set<std::string> servers;
+    for (const KnownServer& server : watch->wait_for_servers(options.servers.size(), deadline()))
+      servers.insert(server.id());
+    return servers;
+  }
+
+  /// The server that has the job (of `cell`; empty: of any), and its present state. Refused where several have one.
+  [[nodiscard]] Result<std::pair<std::string, wire::Job>> find_job(std::int64_t number, const std::string& cell = {}) {
+    std::optional<std::pair<std::string, wire::Job>> found;
+    Error last = no_server();
+    for (const std::string& server : may_have(number)) {
+      auto asked = job(server, number);
+      if (!asked) last = asked.error();
+      if (!asked || (!cell.empty() && asked->cell() != cell)) continue;
+      if (found) return ambiguous(number, found->first, server);
+      found = std::pair(server, std::move(*asked));
+    }
+    if (!found) return tl::make_unexpected(last);
+    return *std::move(found);
+  }
+  [[nodiscard]] static Failure ambiguous(std::int64_t number, const std::string& one, const std::string& other) {
+    return refused("servers {} and {} both have a job {}: each counts its own", one, other, number)
+        .next("name one of them alone");
   }
 
   /// Sends `items` in parts, all to be answered by one model.
@@ -348,7 +387,7 @@ Result<std::int64_t> Session::submit_measurements(const std::string& cell, const
   request.csv(csv);
   const auto reply = participant_->call<wire::SubmitMeasurements>(std::move(request), {cell, {}, true});
   if (!reply) return tl::make_unexpected(reply.error());
-  return reply->job();
+  return participant_->accepted(*reply);
 }
 
 Result<std::int64_t> Session::train(const std::string& cell, const std::vector<std::string>& batch_ids,
@@ -361,7 +400,7 @@ Result<std::int64_t> Session::train(const std::string& cell, const std::vector<s
   request.bias(bias);
   const auto reply = participant_->call<wire::Train>(std::move(request), {cell, {}, true});
   if (!reply) return tl::make_unexpected(reply.error());
-  return reply->job();
+  return participant_->accepted(*reply);
 }
 
 namespace {
@@ -386,7 +425,7 @@ Result<std::int64_t> Session::diagnose(const std::string& cell, const std::strin
   if (apply) {
     const auto reply = participant_->call<wire::Train>(training_of_diagnosis(cell, batch_id, csv, change), route);
     if (!reply) return tl::make_unexpected(reply.error());
-    return reply->job();
+    return participant_->accepted(*reply);
   }
   wire::DiagnoseRequest request;
   request.about().cell(cell);
@@ -395,7 +434,7 @@ Result<std::int64_t> Session::diagnose(const std::string& cell, const std::strin
   request.csv(csv);
   const auto reply = participant_->call<wire::Diagnose>(std::move(request), route);
   if (!reply) return tl::make_unexpected(reply.error());
-  return reply->job();
+  return participant_->accepted(*reply);
 }
 
 Result<std::int64_t> Session::check_health(const std::string& cell, const std::string& batch_id, const std::string& csv,
@@ -409,11 +448,11 @@ Result<std::int64_t> Session::check_health(const std::string& cell, const std::s
   request.tolerance_mm(tolerance_mm);
   const auto reply = participant_->call<wire::CheckHealth>(std::move(request), Route{cell, {}, true});
   if (!reply) return tl::make_unexpected(reply.error());
-  return reply->job();
+  return participant_->accepted(*reply);
 }
 
 Result<DiagnosisAnswer> Session::diagnosis(const std::string& cell, std::int64_t job, bool page) {
-  const auto found = participant_->find_job(job);
+  const auto found = participant_->find_job(job, cell);
   if (!found) return tl::make_unexpected(found.error());
   wire::ReadModelsRequest request;
   request.job(job);
@@ -599,7 +638,10 @@ Result<JobStatus> Session::wait_for_job(std::int64_t job, std::chrono::milliseco
   std::uint64_t seen = 0;
   while (true) {
     if (listener) listener(status);
-    if (is_over(status)) return status;
+    if (is_over(status)) {
+      participant_->told(job, server);
+      return status;
+    }
     std::optional<wire::Job> news;
     while (!news) {
       if (Clock::now() >= deadline) {

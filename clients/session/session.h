@@ -119,7 +119,8 @@ class Session {
   /// Models in force, of every cell, from ModelStatus.
   [[nodiscard]] Result<std::vector<ModelInfo>> model_status();
   /// Calls `listener` with the job's progress until it is done or failed, and returns its last state. kUnreachable:
-  /// `limit` is over. kNotFound: no server knows the job. If the server restarts meanwhile, the call waits for it.
+  /// `limit` is over. kNotFound: no server knows the job. kRefused: several servers have a job of this number, and it
+  /// is not the only one that this session waits for. If the server restarts meanwhile, the call waits for it.
   [[nodiscard]] Result<JobStatus> wait_for_job(std::int64_t job, std::chrono::milliseconds limit,
                                                const std::function<void(const JobStatus&)>& listener);
 

@@ -62,6 +62,24 @@ TEST_F(SeveralServersTest, EachCellsBatchesAndQuestionsReachTheServerThatHasIt) 
   EXPECT_EQ(batches->size(), 2U) << "of both servers, each once";
 }
 
+TEST_F(SeveralServersTest, OfTwoJobsWithOneNumberNoneIsTakenForTheOther) {
+  const auto of_seven = session_->submit_measurements("cell-7", "of-seven", test::virtual_batch_csv(60, 1));
+  ASSERT_TRUE(of_seven) << sentence(of_seven.error());
+  const auto of_eight = session_->submit_measurements("cell-8", "of-eight", test::virtual_batch_csv(60, 2));
+  ASSERT_TRUE(of_eight) << sentence(of_eight.error());
+  ASSERT_EQ(*of_eight, *of_seven) << "every server counts its own jobs";
+  const auto either = session_->wait_for_job(*of_eight, kLimit, nullptr);
+  ASSERT_FALSE(either) << either->what;
+  EXPECT_EQ(either.error().code, ErrorCode::kRefused) << sentence(either.error());
+  client::SessionOptions options = first_.session_options();
+  options.server_ports = {second_.port()};
+  auto alone = client::Session::open(options);
+  ASSERT_TRUE(alone) << sentence(alone.error());
+  const auto over = (*alone)->wait_for_job(*of_eight, kLimit, nullptr);
+  ASSERT_TRUE(over) << sentence(over.error());
+  EXPECT_EQ(over->cell, "cell-8");
+}
+
 TEST_F(SeveralServersTest, AServerThatIsGoneTakesItsOwnCellsWithItAndNoOthers) {
   learn("cell-7", "of-seven", 1);
   second_.kill();
