@@ -277,14 +277,20 @@ struct Session::Participant {
     std::optional<std::pair<std::string, wire::Job>> found;
     Error last = no_server();
     for (const std::string& server : may_have(number)) {
-      auto asked = job(server, number);
+      auto asked = job_of_cell(server, number, cell);
       if (!asked) last = asked.error();
-      if (!asked || (!cell.empty() && asked->cell() != cell)) continue;
+      if (!asked) continue;
       if (found) return ambiguous(number, found->first, server);
       found = std::pair(server, std::move(*asked));
     }
     if (!found) return tl::make_unexpected(last);
     return *std::move(found);
+  }
+  [[nodiscard]] Result<wire::Job> job_of_cell(const std::string& server, std::int64_t number, const std::string& cell) {
+    auto asked = job(server, number);
+    if (!asked || cell.empty() || asked->cell() == cell) return asked;
+    return failure(ErrorCode::kNotFound, "job {} of server {} is of cell {}, not of {}", number, server, asked->cell(),
+                   cell);
   }
   [[nodiscard]] static Failure ambiguous(std::int64_t number, const std::string& one, const std::string& other) {
     return refused("servers {} and {} both have a job {}: each counts its own", one, other, number)
