@@ -239,6 +239,7 @@ void ReplicaLink::step() {
   set_trouble("role", decision.trouble);
   keep_copies();
   if (decision.leader != nullptr) follow(*decision.leader, *view);
+  if (decision.record.writes) set_trouble("follow", "");
   view = store_.replica_view();
   if (!view || !view->record) return;
   {
