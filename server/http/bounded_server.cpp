@@ -3,8 +3,6 @@
 #include <arpa/inet.h>
 #include <httplib.h>
 #include <netinet/in.h>
-#include <pthread.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -13,83 +11,84 @@
 #include <cstring>
 #include <deque>
 #include <exception>
+#include <map>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "server/base/mutex.h"
 #include "server/http/deadline_stream.h"
+#include "server/http/incoming.h"
 
 namespace trammel {
 namespace {
 
-constexpr int kNiceness = 10;              // of all its threads: answering on DDS comes first
 constexpr std::size_t kLongestUri = 2048;  // bytes
+constexpr int kBacklog = 1024;             // connections that wait to be accepted
 
 constexpr const char* kTooMany =
     "HTTP/1.1 503 Service Unavailable\r\nContent-Length: 9\r\nContent-Type: text/plain\r\nRetry-After: 1\r\n"
     "Connection: close\r\n\r\ntoo many\n";
 
-/// Whether the thread may only send away whoever it has accepted.
-thread_local bool sends_away = false;
-
-void become(const char* name) {
-  ::pthread_setname_np(::pthread_self(), name);
-  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kNiceness);  // of this thread alone, as Linux has it
+void send_away(int socket) {
+  static_cast<void>(::send(socket, kTooMany, std::strlen(kTooMany), MSG_NOSIGNAL | MSG_DONTWAIT));
+  close_with_words(socket);
 }
 
-/// A bounded queue of connections and the threads that serve them.
-class Connections final : public httplib::TaskQueue {
+/// Whoever accepts a connection does with it what is to be done: that never waits.
+class AtOnce final : public httplib::TaskQueue {
  public:
-  explicit Connections(const HttpLimits& limits) : limits_(limits) {
-    for (std::size_t i = 0; i < limits.workers; ++i)
-      workers_.emplace_back([this](const std::stop_token& stop) { work(stop); });
-  }
+  void enqueue(std::function<void()> take) override { take(); }
+  void shutdown() override {}
+};
 
-  void enqueue(std::function<void()> serve) override {
-    {
-      const MutexLock lock(mutex_);
-      if (waiting_.size() < limits_.waiting) {
-        waiting_.push_back(std::move(serve));
-        came_.notify_one();
-        return;
-      }
-    }
-    sends_away = true;
-    serve();
-    sends_away = false;
-  }
+/// A bounded queue of connections whose request has come, and the threads that answer them.
+class Workers {
+ public:
+  using Serve = std::function<void(int socket)>;
 
-  void shutdown() override {
+  Workers(std::size_t count, std::size_t most, Serve serve) : most_(most), serve_(std::move(serve)) {
+    for (std::size_t i = 0; i < count; ++i) workers_.emplace_back([this](const std::stop_token& stop) { work(stop); });
+  }
+  ~Workers() {
     for (std::jthread& worker : workers_) worker.request_stop();
     workers_.clear();
-    sends_away = true;
     const MutexLock lock(mutex_);
-    for (const auto& serve : waiting_) serve();
-    waiting_.clear();
-    sends_away = false;
+    for (const int socket : waiting_) send_away(socket);
+  }
+  Workers(const Workers&) = delete;
+  Workers& operator=(const Workers&) = delete;
+
+  /// False: there is no room.
+  [[nodiscard]] bool take(int socket) {
+    const MutexLock lock(mutex_);
+    if (waiting_.size() >= most_) return false;
+    waiting_.push_back(socket);
+    came_.notify_one();
+    return true;
   }
 
  private:
   void work(const std::stop_token& stop) {
-    become("http");
+    become_http_thread("http");
     for (;;) {
-      std::function<void()> serve;
+      int socket = -1;
       {
         MutexLock lock(mutex_);
         came_.wait(lock, stop, [this]() TRAMMEL_REQUIRES(mutex_) { return !waiting_.empty(); });
         if (stop.stop_requested()) return;
-        serve = std::move(waiting_.front());
+        socket = waiting_.front();
         waiting_.pop_front();
       }
-      serve();
+      serve_(socket);
     }
   }
 
-  const HttpLimits limits_;
+  const std::size_t most_;
+  const Serve serve_;
   Mutex mutex_;
   Condition came_;
-  std::deque<std::function<void()>> waiting_ TRAMMEL_GUARDED_BY(mutex_);
+  std::deque<int> waiting_ TRAMMEL_GUARDED_BY(mutex_);
   std::vector<std::jthread> workers_;
 };
 
@@ -99,6 +98,13 @@ bool is_of_this_host(const std::string& host) {
   in_addr parsed{};
   const bool is_loopback = ::inet_pton(AF_INET, name.c_str(), &parsed) == 1 && ntohl(parsed.s_addr) >> 24 == 127;
   return name == "localhost" || is_loopback;
+}
+
+/// The first word of the path that a request asks for.
+std::string first_word(const std::string& head) {
+  const std::size_t slash = head.find('/');
+  if (slash == std::string::npos) return {};
+  return head.substr(slash + 1, head.find_first_of(" /?#\r", slash + 1) - slash - 1);
 }
 
 /// The words between the slashes of a path that is read already.
@@ -141,7 +147,9 @@ sockaddr_in socket_address(const std::string& address, std::uint16_t port) {
 class BoundedServer::Running final : public httplib::Server {
  public:
   Running(const HttpLimits& limits, HttpHandler handler) : limits_(limits), handler_(std::move(handler)) {
-    new_task_queue = [this] { return new Connections(limits_); };
+    for (const std::string& word : limits_.apart)
+      apart_[word] = std::make_unique<Workers>(1, limits_.waiting, [this](int socket) { serve(socket); });
+    new_task_queue = [] { return new AtOnce; };
     // By itself it would share the port with whoever listens there.
     set_socket_options([](int socket) {
       const int yes = 1;
@@ -166,9 +174,11 @@ class BoundedServer::Running final : public httplib::Server {
   Running(const Running&) = delete;
   Running& operator=(const Running&) = delete;
 
+  /// The library lets five connections wait to be accepted.
+  void let_many_wait() { ::listen(svr_sock_, kBacklog); }
   void listen_in_a_thread() {
     thread_ = std::jthread([this] {
-      become("http accept");
+      become_http_thread("http accept");
       listen_after_bind();
     });
   }
@@ -177,23 +187,36 @@ class BoundedServer::Running final : public httplib::Server {
 
  private:
   bool process_and_close_socket(socket_t socket) override {
+    incoming_.add(socket);
+    return true;
+  }
+  void serve(int socket) {
     DeadlineStream stream(socket, limits_.reading, limits_.writing);
-    if (sends_away) {
-      ++shed_;
-      static_cast<void>(::send(socket, kTooMany, std::strlen(kTooMany), MSG_NOSIGNAL | MSG_DONTWAIT));
-      return false;
-    }
     bool closed = false;
     // One request a connection; neither compressed nor in pieces: that is work, and nobody is far away.
-    return process_request(stream, true, closed, [](httplib::Request& request) {
+    process_request(stream, true, closed, [](httplib::Request& request) {
       request.headers.erase("Accept-Encoding");
       request.ranges.clear();
     });
+  }
+  void give(int socket, const std::string& head) {
+    const auto own = apart_.find(first_word(head));
+    Workers& workers = own == apart_.end() ? workers_ : *own->second;
+    if (!workers.take(socket)) shed(socket);
+  }
+  void shed(int socket) {
+    ++shed_;
+    send_away(socket);
   }
 
   const HttpLimits limits_;
   const HttpHandler handler_;
   std::atomic<std::uint64_t> shed_{0};
+  Workers workers_{limits_.workers, limits_.waiting, [this](int socket) { serve(socket); }};
+  std::map<std::string, std::unique_ptr<Workers>> apart_;  // by the first word of the path
+  Incoming incoming_{limits_.waiting, limits_.reading,
+                     [this](int socket, const std::string& head) { give(socket, head); },
+                     [this](int socket) { shed(socket); }};
   std::jthread thread_;
 };
 
@@ -209,6 +232,7 @@ Result<std::unique_ptr<BoundedServer>> BoundedServer::start(const std::string& a
   auto running = std::make_unique<Running>(limits, std::move(handler));
   if (!running->bind_to_port(address, port))
     return failure(ErrorCode::kConflict, "{}:{} cannot be listened on", address, port).of("port").with_value(port);
+  running->let_many_wait();
   running->listen_in_a_thread();
   while (!running->is_running()) std::this_thread::yield();  // stop() does nothing before
   return std::unique_ptr<BoundedServer>(new BoundedServer(std::move(running)));

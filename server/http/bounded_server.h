@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "server/base/result.h"
 #include "server/http/exchange.h"
@@ -14,15 +15,16 @@ namespace trammel {
 
 struct HttpLimits {
   std::size_t workers = 4;
-  std::size_t waiting = 32;                 ///< connections; one more is answered 503 at once
+  std::size_t waiting = 32;                 ///< requests; one more is answered 503 at once
   std::chrono::milliseconds reading{2000};  ///< for a request from its first byte to its last
   std::chrono::milliseconds writing{5000};  ///< for a reply
+  std::vector<std::string> apart = {};      ///< first words of paths that have a worker of their own each
 };
 
-/// A server of HTTP/1.1 for GET and HEAD, one request a connection. A fixed number of threads of low priority, a
-/// bounded queue, and a time for each request: whoever is slow or comes too often holds up himself and others who read
-/// pages, and nothing else of the process. It answers to names of this host only, so that no page of somebody else's
-/// can ask through a browser (DNS rebinding).
+/// A server of HTTP/1.1 for GET and HEAD, one request a connection. A fixed number of threads of low priority, bounded
+/// queues, and a time for each request: whoever is slow to ask holds up nobody, whoever is slow to read others who read
+/// what has no worker of its own, and neither anything else of the process. It answers to names of this host only, so
+/// that no page of somebody else's can ask through a browser (DNS rebinding).
 class BoundedServer {
  public:
   /// Listens until it is destroyed. `handler` is called in its threads. Refuses (kUsage) an address that is not

@@ -25,11 +25,7 @@ DeadlineStream::DeadlineStream(int socket, std::chrono::milliseconds reading, st
   ::fcntl(socket_, F_SETFL, ::fcntl(socket_, F_GETFL) | O_NONBLOCK);
 }
 
-DeadlineStream::~DeadlineStream() {
-  ::shutdown(socket_, SHUT_WR);
-  read_what_is_left(socket_);
-  ::close(socket_);
-}
+DeadlineStream::~DeadlineStream() { close_with_words(socket_); }
 
 bool DeadlineStream::wait(short events, Clock::time_point until) const {
   for (;;) {
@@ -78,5 +74,11 @@ void DeadlineStream::get_remote_ip_and_port(std::string& ip, int& port) const {
 }
 
 void DeadlineStream::get_local_ip_and_port(std::string& ip, int& port) const { get_remote_ip_and_port(ip, port); }
+
+void close_with_words(int socket) {
+  ::shutdown(socket, SHUT_WR);
+  read_what_is_left(socket);
+  ::close(socket);
+}
 
 }  // namespace trammel

@@ -40,4 +40,7 @@ class DeadlineStream final : public httplib::Stream {
   std::size_t from_ = 0, to_ = 0;  // what of the buffer is not read yet
 };
 
+/// Ends a connection so that the other side still reads what it was sent.
+void close_with_words(int socket);
+
 }  // namespace trammel

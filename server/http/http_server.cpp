@@ -14,7 +14,6 @@ namespace {
 
 constexpr const char* kJson = "application/json";
 constexpr const char* kMetricsType = "text/plain; version=0.0.4; charset=utf-8";
-constexpr int kMostOthers = 3;  // of the threads: one always has time to say whether the server is well
 
 HttpReply json_reply(int code, const nlohmann::ordered_json& json) {
   return {code, kJson, json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n"};
@@ -34,7 +33,9 @@ class HttpServer::Running {
 
   Status start() {
     if (options_.port == 0) return {};
-    auto listening = BoundedServer::start(options_.address, options_.port, HttpLimits(),
+    HttpLimits limits;
+    limits.apart = {"healthz", "readyz", "metrics"};  // a reader of pages holds up no supervisor
+    auto listening = BoundedServer::start(options_.address, options_.port, limits,
                                           [this](const HttpAsk& ask) { return answer(ask); });
     if (!listening) return Failure(listening.error()).under("http");
     listening_ = std::move(*listening);
@@ -47,13 +48,18 @@ class HttpServer::Running {
 
  private:
   HttpReply answer(const HttpAsk& ask) {
-    if (ask.path.size() == 1 && ask.path[0] == "healthz") return health();
-    const int others = ++others_;
-    HttpReply reply = others > kMostOthers
-                          ? HttpReply{503, "text/plain; charset=utf-8", "too many\n", {{"Retry-After", "1"}}}
-                          : other(ask);
-    --others_;
-    return reply;
+    const ServerPhase phase = phase_;
+    if (ask.path.size() != 1) return pages_.answer(ask, phase);
+    if (ask.path[0] == "healthz") return health();
+    if (ask.path[0] == "metrics") {
+      const BoundedServer* listens = listens_;
+      return {200, kMetricsType, metrics_.text(phase, listens == nullptr ? 0 : listens->shed())};
+    }
+    if (ask.path[0] == "readyz") {
+      const Readiness now = readiness(server_, phase, option(ask, "cell"));
+      return json_reply(now.ready ? 200 : 503, now.told);
+    }
+    return pages_.answer(ask, phase);
   }
 
   HttpReply health() const {
@@ -64,23 +70,9 @@ class HttpServer::Running {
     return json_reply(healthy ? 200 : 503, {{"healthy", healthy}, {"still", movement.still}});
   }
 
-  HttpReply other(const HttpAsk& ask) {
-    const ServerPhase phase = phase_;
-    if (ask.path.size() == 1 && ask.path[0] == "metrics") {
-      const BoundedServer* listens = listens_;
-      return {200, kMetricsType, metrics_.text(phase, listens == nullptr ? 0 : listens->shed())};
-    }
-    if (ask.path.size() == 1 && ask.path[0] == "readyz") {
-      const Readiness now = readiness(server_, phase, option(ask, "cell"));
-      return json_reply(now.ready ? 200 : 503, now.told);
-    }
-    return pages_.answer(ask, phase);
-  }
-
   const HttpOptions options_;
   const Watched server_;
   std::atomic<ServerPhase> phase_{ServerPhase::kStarting};
-  std::atomic<int> others_{0};  // requests that are worked on, besides those for the health
   Metrics metrics_;
   Pages pages_;
   std::atomic<const BoundedServer*> listens_{nullptr};

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <deque>
+#include <latch>
 #include <memory>
 #include <vector>
 
@@ -97,20 +99,68 @@ TEST_F(BoundedServerTest, WhoeverSendsSlowlyIsCutOffAndHoldsUpNobodyForLong) {
   for (const auto& connection : slow) EXPECT_TRUE(connection->closes_within(seconds(20)));
 }
 
-TEST_F(BoundedServerTest, MoreThanMayWaitAreSentAwayAtOnceAndCounted) {
+TEST_F(BoundedServerTest, WhoeverComesSlowlyAgainAndAgainHoldsUpNobodyElse) {
+  start();
+  std::deque<OpenConnection> slow;
+  for (int round = 0; round < 20; ++round) {
+    for (int i = 0; i < 40; ++i) slow.emplace_back(kPort).send("GET / HT");
+    while (slow.size() > 120) slow.pop_front();
+    for (const OpenConnection& one : slow) one.send("T");
+    EXPECT_EQ(http_get(kPort, "/healthz").code, 200) << round;
+  }
+  EXPECT_GE(server_->shed(), 700u);
+}
+
+TEST_F(BoundedServerTest, WhereTooManyAreSlowTheSlowestIsSentAwayAndCounted) {
   HttpLimits limits;
   limits.workers = 1;
   limits.waiting = 2;
   limits.reading = seconds(20);
   start(limits);
   std::vector<std::unique_ptr<OpenConnection>> waiting;
-  for (int i = 0; i < 3; ++i) waiting.push_back(std::make_unique<OpenConnection>(kPort));
-  // The first may not be taken from the queue yet.
-  for (int i = 0; i < 3; ++i) waiting.push_back(std::make_unique<OpenConnection>(kPort));
+  for (int i = 0; i < 6; ++i) waiting.push_back(std::make_unique<OpenConnection>(kPort));
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(parse_http(waiting[i]->read(seconds(10))).code, 503) << i;
+  EXPECT_EQ(server_->shed(), 4u);
+  waiting[4]->send("GET /fifth HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  EXPECT_EQ(parse_http(waiting[4]->read(seconds(10))).body, "fifth|");
+}
+
+TEST_F(BoundedServerTest, MoreRequestsThanMayWaitAreSentAwayAtOnce) {
+  HttpLimits limits;
+  limits.workers = 1;
+  limits.waiting = 2;
+  std::latch over(1);
+  start(limits, [&](const HttpAsk&) -> HttpReply {
+    over.wait();
+    return {200, "text/plain; charset=utf-8", "late"};
+  });
+  std::vector<std::unique_ptr<OpenConnection>> waiting;
+  for (int i = 0; i < 6; ++i) {
+    waiting.push_back(std::make_unique<OpenConnection>(kPort));
+    waiting.back()->send("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  }
   EXPECT_EQ(parse_http(waiting.back()->read(seconds(10))).code, 503);
-  EXPECT_GE(server_->shed(), 1u);
-  waiting.front()->send("GET /first HTTP/1.1\r\nHost: localhost\r\n\r\n");
-  EXPECT_EQ(parse_http(waiting.front()->read(seconds(10))).body, "first|") << "who came first is served";
+  over.count_down();
+  EXPECT_EQ(parse_http(waiting.front()->read(seconds(10))).body, "late") << "who came first is served";
+}
+
+TEST_F(BoundedServerTest, WhatHasAWorkerOfItsOwnIsAnsweredWhileEverythingElseIsHeldUp) {
+  HttpLimits limits;
+  limits.workers = 1;
+  limits.apart = {"healthz"};
+  std::latch over(1);
+  start(limits, [&](const HttpAsk& ask) -> HttpReply {
+    if (ask.path != std::vector<std::string>{"healthz"}) over.wait();
+    return echo(ask);
+  });
+  std::vector<std::unique_ptr<OpenConnection>> others;
+  for (int i = 0; i < 100; ++i) {
+    others.push_back(std::make_unique<OpenConnection>(kPort));
+    others.back()->send("GET /page HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  }
+  EXPECT_EQ(http_get(kPort, "/healthz").body, "healthz|");
+  over.count_down();
+  EXPECT_EQ(parse_http(others.front()->read(seconds(10))).body, "page|");
 }
 
 TEST_F(BoundedServerTest, AHandlerThatThrowsIsAnAnswer) {

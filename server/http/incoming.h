@@ -1,0 +1,62 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "server/base/mutex.h"
+
+namespace trammel {
+
+/// Connections whose request has not come yet. They take no worker: one thread watches all of them, and hands on each
+/// whose request has its head. Whoever is slow can hold up nobody: where there is no room, the one that has been slow
+/// for longest makes it. Thread-safe.
+class Incoming {
+ public:
+  using Come = std::function<void(int socket, const std::string& head)>;  ///< closes it, sooner or later
+  using PushedOut = std::function<void(int socket)>;                      ///< closes it
+
+  /// `come`: takes what can be read at once. `pushed_out`: takes what made room, and what waits at the end.
+  Incoming(std::size_t most, std::chrono::milliseconds patience, Come come, PushedOut pushed_out);
+  ~Incoming();
+  Incoming(const Incoming&) = delete;
+  Incoming& operator=(const Incoming&) = delete;
+
+  void add(int socket);
+
+ private:
+  using Time = std::chrono::steady_clock::time_point;
+  struct Slow {
+    int socket;
+    Time since;
+  };
+
+  struct Head;
+  [[nodiscard]] static Head head_of(int socket);
+  /// Hands on a connection whose head is there, and closes one whose head is too long.
+  void take(int socket, const Head& head) const;
+  void watch(const std::stop_token& stop);
+  void look_at(int socket);
+  void close_late();
+  [[nodiscard]] std::optional<int> make_room() TRAMMEL_REQUIRES(mutex_);
+  void send_out(int socket) const;
+  void wake() const;
+
+  const std::size_t most_;
+  const std::chrono::milliseconds patience_;
+  const Come come_;
+  const PushedOut pushed_out_;
+  const int epoll_, wakes_;
+  Mutex mutex_;
+  std::vector<Slow> slow_ TRAMMEL_GUARDED_BY(mutex_);  // oldest first
+  std::jthread thread_;
+};
+
+/// Names the calling thread and lowers its priority: answering on DDS comes first.
+void become_http_thread(const char* name);
+
+}  // namespace trammel
