@@ -102,12 +102,20 @@ class ReplicasTest : public testing::Test {
     return test::run(words, kLimit);
   }
 
+  bool wait_until_it_keeps(const test::Daemon& daemon, const std::string& batch) {
+    std::string kept;
+    for (const auto until = steady_clock::now() + kLimit;
+         kept.find(batch) == std::string::npos && steady_clock::now() < until;)
+      kept = ask(daemon, {"batches", "--cell", "cell-7", "--json", "-"}).out;
+    return kept.find(batch) != std::string::npos;
+  }
+
   test::Daemon first_{0}, second_{1};
   std::vector<std::string> files_;
   std::unique_ptr<client::Session> session_;
 };
 
-TEST_F(ReplicasTest, AFollowerThatTakesOnACellGetsTheModelThatTheWriterHasHadForLong) {
+TEST_F(ReplicasTest, AFollowerThatTakesOnACellGetsItsModelAndBatchesThoughTheyAreOld) {
   std::string other = test::read_file(std::filesystem::path(first_.config_path()).replace_filename("cell-7.yaml"));
   other.replace(other.find("cell: cell-7"), 12, "cell: cell-8");
   for (const int which : {0, 1}) {
@@ -119,14 +127,16 @@ TEST_F(ReplicasTest, AFollowerThatTakesOnACellGetsTheModelThatTheWriterHasHadFor
   };
   name_cells(0, "[cell-7.yaml]", "[cell-7.yaml, cell-8.yaml]");
   name_cells(1, "[cell-7.yaml]", "[cell-8.yaml]");
-  give_usual_parts();
+  const std::string copies = ", batches_to_followers: true, copy_timeout_s: 1";
+  give_usual_parts(copies);
   start_both();
   learn("lt-1", 1);
   name_cells(1, "[cell-8.yaml]", "[cell-8.yaml, cell-7.yaml]");
-  give_usual_parts();
+  give_usual_parts(copies);
   second_.process().signal(SIGHUP);
   ASSERT_TRUE(second_.process().wait_for_line("taken on: cells: cell-7", kLimit)) << second_.process().standard_error();
   ASSERT_TRUE(wait_until(same)) << second_.process().standard_error();
+  EXPECT_TRUE(wait_until_it_keeps(second_, "lt-1"));
   first_.kill();
   const auto answer = session_->predict_error(kContext, test::virtual_joints(3, 7));
   ASSERT_TRUE(answer) << sentence(answer.error());
@@ -192,11 +202,7 @@ TEST_F(ReplicasTest, AFollowerThatWasAwayGetsTheBatchesThatItLacks) {
   learn("lt-1", 1);
   second_.start();
   ASSERT_TRUE(wait_until(same));
-  const auto until = steady_clock::now() + kLimit;
-  std::string kept;
-  while (kept.find("lt-1") == std::string::npos && steady_clock::now() < until)
-    kept = ask(second_, {"batches", "--cell", "cell-7", "--json", "-"}).out;
-  EXPECT_NE(kept.find("lt-1"), std::string::npos) << kept;
+  EXPECT_TRUE(wait_until_it_keeps(second_, "lt-1"));
 }
 
 TEST_F(ReplicasTest, WhenTheWriterIsKilledTheFollowerAnswersAtOnce) {

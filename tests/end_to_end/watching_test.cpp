@@ -241,6 +241,24 @@ TEST_F(ReloadOfCellsTest, ABrokenCellFileIsNamedAndChangesNothingAndAChangedOneC
   EXPECT_EQ(daemon_.stop(), 0);
 }
 
+TEST_F(WatchingTest, ACellThatIsAddedWhileItServesHasItsPageItsReadinessAndItsFigures) {
+  EXPECT_EQ(get("/cells/cell-8").code, 404);
+  const std::filesystem::path server_file = daemon_.config_path();
+  std::string cell = test::read_file(std::filesystem::path(server_file).replace_filename("cell-7.yaml"));
+  cell.replace(cell.find("cell: cell-7"), 12, "cell: cell-8");
+  ASSERT_TRUE(write_text_file(std::filesystem::path(server_file).replace_filename("cell-8.yaml"), cell));
+  original_.replace(original_.find("[cell-7.yaml]"), 13, "[cell-7.yaml, cell-8.yaml]");
+  write_config("");
+  daemon_.process().signal(SIGHUP);
+  ASSERT_TRUE(daemon_.process().wait_for_line("taken on: cells: cell-8", kLimit)) << daemon_.process().standard_error();
+  EXPECT_EQ(get("/cells/cell-8").code, 200);
+  EXPECT_NE(get("/").body.find("cell-8"), std::string::npos);
+  const auto ready = get("/readyz?cell=cell-8");
+  EXPECT_EQ(ready.code, 503);
+  EXPECT_NE(ready.body.find("untrained"), std::string::npos) << ready.body;
+  EXPECT_EQ(metric("trammel_cell_ready{cell=\"cell-8\""), 0);
+}
+
 TEST_F(WatchingTest, InJsonEachFactIsALineThatSaysWhoAskedAndUnderWhichTrace) {
   EXPECT_EQ(daemon_.stop(), 0);
   write_config("", "log: {level: debug, format: json}\n");
