@@ -424,6 +424,26 @@ TEST_F(CommandLine, TargetsWithoutACorrectionSayWhyAndCarryNoNumbers) {
   EXPECT_NE(table.field(0, table.require("message").value()), "");
 }
 
+TEST_F(CommandLine, TargetsOfATableAreHeldAgainstATolerance) {
+  const std::string model = train(measure("b", 60, 1), "M3");
+  const std::string targets = folder_.write("t.csv",
+                                            "x_mm,y_mm,z_mm,qw,qx,qy,qz,conf\n"
+                                            "1800,100,1200,0.7071067811865476,0,0.7071067811865476,0,0\n"
+                                            "1800,-100,1200,0.7071067811865476,0,0.7071067811865476,0,0\n"
+                                            "9000,0,1000,1,0,0,0,0\n");
+  const auto inside = [&](const std::string& tolerance) {
+    const Finished corrected = trammel({"correct", "--model", model, targets, "-o", file("c.csv"), "--json",
+                                        file("c.json"), "--tolerance", tolerance});
+    EXPECT_NE(corrected.err.find("tolerance " + tolerance + " mm: "), std::string::npos) << corrected.err;
+    EXPECT_NE(corrected.err.find("of 1 the error is not known"), std::string::npos) << corrected.err;
+    const json verdict = json::parse(test::read_file(file("c.json"))).at("tolerance");
+    EXPECT_EQ(verdict.at("targets"), 2);
+    return std::pair<int, int>(verdict.at("inside_before"), verdict.at("inside_after"));
+  };
+  EXPECT_EQ(inside("0.8"), (std::pair{0, 2})) << "millimetres off before, some tenths at most after";
+  EXPECT_EQ(inside("0.001"), (std::pair{0, 0}));
+}
+
 TEST_F(CommandLine, AJointTargetOutsideTheLimitsIsAStatusNotARefusal) {
   const std::string model = train(measure("b", 40, 1), "M1");
   const std::string targets = folder_.write("t.csv",

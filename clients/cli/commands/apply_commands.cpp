@@ -1,5 +1,8 @@
 #include <CLI/CLI.hpp>
 #include <filesystem>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/commands/correct_program.h"
@@ -9,6 +12,7 @@
 #include "clients/cli/service/answers.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
+#include "clients/cli/text/tolerance.h"
 #include "clients/cli/work/in_parallel.h"
 #include "server/base/plain_text.h"
 #include "server/compensate/model_file.h"
@@ -185,6 +189,24 @@ struct CorrectArguments : ApplyArguments {
   }
 };
 
+/// What is said of programs alone.
+Status check_table_usage(const CorrectArguments& arguments) {
+  const std::pair<bool, const char*> of_programs[] = {{!arguments.report.empty(), "--report"},
+                                                      {!arguments.frames.empty(), "--frames"},
+                                                      {arguments.split, "--split"},
+                                                      {arguments.keep_digits, "--keep-digits"},
+                                                      {arguments.keep_joints, "--keep-joints"},
+                                                      {arguments.undo, "--undo"},
+                                                      {arguments.again, "--again"}};
+  for (const auto& [said, option] : of_programs) {
+    if (said)
+      return failure(ErrorCode::kUsage, "a table of targets, and {} is of programs", option)
+          .in(arguments.inputs[0])
+          .of(option);
+  }
+  return {};
+}
+
 Status check_usage(const CorrectArguments& arguments) {
   if (!arguments.undo && arguments.model.empty())
     return failure(ErrorCode::kUsage, "--model is required").of("--model").next("it may be left out with --undo only");
@@ -202,9 +224,15 @@ Status check_usage(const CorrectArguments& arguments) {
         .with_text(ending)
         .next("known: .csv and the endings of programs; --format says what it is");
   }
-  if (arguments.undo)
-    return failure(ErrorCode::kUsage, "a table of targets has nothing to undo").in(arguments.inputs[0]).of("--undo");
-  return {};
+  return check_table_usage(arguments);
+}
+
+std::optional<ToleranceVerdict> verdict_of(const Corrections& corrections, double tolerance_mm) {
+  if (tolerance_mm <= 0) return std::nullopt;
+  std::vector<ExpectedError> errors;
+  for (const client::CorrectedTarget& item : corrections.items)
+    errors.push_back({item.error_before_mm, item.error_after_mm, item.sigma_mm});
+  return tolerance_verdict(errors, tolerance_mm);
 }
 
 Result<Extent> correct(CorrectArguments arguments) {
@@ -227,8 +255,13 @@ Result<Extent> correct(CorrectArguments arguments) {
     const Status written = write_output(arguments.receipt, corrections_csv(*file, *corrections));
     if (!written) return tl::make_unexpected(written.error());
   }
-  fmt::print(stderr, "{}", shown_lines(corrections_summary(*corrections) + left_alone));
-  const Status written = write_json(arguments.json, corrections_json(*file, *corrections));
+  const auto verdict = verdict_of(*corrections, arguments.tolerance_mm);
+  fmt::print(
+      stderr, "{}",
+      shown_lines(corrections_summary(*corrections) + left_alone + (verdict ? verdict_text(*verdict) + "\n" : "")));
+  auto json = corrections_json(*file, *corrections);
+  if (verdict) json["tolerance"] = tolerance_json(*verdict);
+  const Status written = write_json(arguments.json, json);
   if (!written) return tl::make_unexpected(written.error());
   return left_alone.empty() || arguments.allow_failed ? Extent::kAll : Extent::kPart;
 }
@@ -273,6 +306,10 @@ Status check_usage(const PredictArguments& arguments) {
         .of("--joints")
         .next("name a program, or joints by --joints");
   }
+  if (!program && !(arguments.format.empty() && arguments.frames.empty())) {
+    return failure(ErrorCode::kUsage, "--format and --frames are of programs, not of joints")
+        .of(arguments.format.empty() ? "--frames" : "--format");
+  }
   if (program && (arguments.covariance || arguments.orientation)) {
     return failure(ErrorCode::kUsage, "--covariance and --orientation are of joints, not of programs")
         .of(arguments.covariance ? "--covariance" : "--orientation");
@@ -314,13 +351,7 @@ void add_predict(CLI::App& app, Action& chosen) {
 void add_program_options(CLI::App& command, CorrectArguments& arguments) {
   const std::string group = "Programs";
   add_reading_options(command, arguments.format, arguments.frames);
-  command.add_option("--receipt", arguments.receipt, "What became of each target, as CSV")->group(group);
   command.add_option("--report", arguments.report, "The receipt as a page, with the path in 3D (HTML)")->group(group);
-  command
-      .add_option("--tolerance", arguments.tolerance_mm,
-                  "Tell how many targets are expected this near to where they are wanted, mm, with 95 %")
-      ->check(above_zero())
-      ->group(group);
   command
       .add_flag("--keep-digits", arguments.keep_digits,
                 "Write numbers with the decimals that they have, even where rounding takes more than a tenth of what "
@@ -362,6 +393,11 @@ void add_correct(CLI::App& app, Action& chosen) {
       ->add_flag("--strict", arguments->strict,
                  "Write nothing and exit with 3 where any target would be left as it was")
       ->excludes(allow_failed);
+  command->add_option("--receipt", arguments->receipt, "What became of each target, as CSV");
+  command
+      ->add_option("--tolerance", arguments->tolerance_mm,
+                   "Tell how many targets are expected this near to where they are wanted, mm, with 95 %")
+      ->check(above_zero());
   add_apply_options(*command, *arguments);
   add_program_options(*command, *arguments);
   command->callback([arguments, &chosen] { chosen = [arguments] { return correct(*arguments); }; });

@@ -140,7 +140,7 @@ Status write_receipts(const Corrected& done, const CorrectProgramArguments& argu
   }
   if (arguments.json.empty()) return {};
   std::optional<ToleranceVerdict> verdict;
-  if (arguments.tolerance_mm > 0) verdict = tolerance_verdict(corrected, arguments.tolerance_mm);
+  if (arguments.tolerance_mm > 0) verdict = tolerance_verdict(expected_errors(corrected), arguments.tolerance_mm);
   return write_output(arguments.json, receipt_json(corrected, verdict));
 }
 
@@ -170,7 +170,8 @@ Result<Extent> correct_program(const CorrectProgramArguments& arguments) {
   if (const Status written = write_files(*files, corrected->files, corrected->changed, *paths); !written)
     return tl::make_unexpected(written.error());
   std::string told = receipt_summary(*corrected) + left;
-  if (arguments.tolerance_mm > 0) told += verdict_text(tolerance_verdict(*corrected, arguments.tolerance_mm)) + "\n";
+  if (arguments.tolerance_mm > 0)
+    told += verdict_text(tolerance_verdict(expected_errors(*corrected), arguments.tolerance_mm)) + "\n";
   fmt::print(stderr, "{}", shown_lines(told));
   if (const Status written = write_receipts(*done, arguments); !written) return tl::make_unexpected(written.error());
   const bool nothing = corrected->rows.empty();

@@ -23,28 +23,8 @@ using cam::CorrectedProgram;
 using cam::ReceiptRow;
 using nlohmann::ordered_json;
 
-constexpr double kSure = 0.95;
 constexpr std::size_t kMostRows = 2000;    // of the table; the CSV has all
 constexpr std::size_t kMostPoints = 6000;  // of the drawing
-
-/// Probability that |e| <= r for e with a mean of this length and this stddev of each axis.
-double inside(double r, double mean, double stddev) {
-  if (stddev <= 0) return mean <= r ? 1 : 0;
-  const double a = (r - mean) / stddev, b = (r + mean) / stddev;
-  if (mean < 1e-6 * stddev) {
-    const double x = r / stddev;
-    return std::erf(x / std::sqrt(2.0)) - std::sqrt(2 / kPi) * x * std::exp(-0.5 * x * x);
-  }
-  const double tail = std::exp(-0.5 * a * a) - std::exp(-0.5 * b * b);
-  return std::max(0.0, 0.5 * (std::erf(a / std::sqrt(2.0)) + std::erf(b / std::sqrt(2.0))) -
-                           stddev / (mean * std::sqrt(2 * kPi)) * tail);
-}
-
-/// Of an error with this rms.
-double share_inside(double tolerance, double rms, double sigma) {
-  const double mean = std::sqrt(std::max(0.0, rms * rms - 3 * sigma * sigma));
-  return inside(tolerance, mean, sigma);
-}
 
 std::string mm(double value) { return std::isfinite(value) ? fmt::format("{:.4f}", value) : ""; }
 
@@ -86,7 +66,8 @@ std::string verdict_of(const CorrectedProgram& program, double tolerance_mm) {
   };
   if (const auto outside = count("out_of_domain"); outside > 0)
     text += fmt::format(" {} are outside the poses that the model learned from.", outside);
-  if (tolerance_mm > 0) text += " Held against " + verdict_text(tolerance_verdict(program, tolerance_mm)) + ".";
+  if (tolerance_mm > 0)
+    text += " Held against " + verdict_text(tolerance_verdict(expected_errors(program), tolerance_mm)) + ".";
   return text;
 }
 
@@ -160,25 +141,10 @@ std::string files_of(const CorrectedProgram& program) {
 
 }  // namespace
 
-ToleranceVerdict tolerance_verdict(const CorrectedProgram& program, double tolerance_mm) {
-  ToleranceVerdict verdict{tolerance_mm};
-  for (const ReceiptRow& row : program.rows) {
-    if (!std::isfinite(row.error_before_mm) || !std::isfinite(row.sigma_mm)) continue;
-    ++verdict.targets;
-    const double before = share_inside(tolerance_mm, row.error_before_mm, row.sigma_mm);
-    const double after = share_inside(tolerance_mm, row.error_after_mm, row.sigma_mm);
-    verdict.expected_before += before;
-    verdict.expected_after += after;
-    if (before >= kSure) ++verdict.before;
-    if (after >= kSure) ++verdict.after;
-  }
-  return verdict;
-}
-
-std::string verdict_text(const ToleranceVerdict& verdict) {
-  return fmt::format(
-      "tolerance {:.4g} mm: {} of {} targets are inside with 95 % or more (before: {}); {:.1f} are expected inside",
-      verdict.tolerance_mm, verdict.after, verdict.targets, verdict.before, verdict.expected_after);
+std::vector<ExpectedError> expected_errors(const CorrectedProgram& program) {
+  std::vector<ExpectedError> errors;
+  for (const ReceiptRow& row : program.rows) errors.push_back({row.error_before_mm, row.error_after_mm, row.sigma_mm});
+  return errors;
 }
 
 std::string receipt_page(const CorrectedProgram& program, double tolerance_mm, const CellPapers& papers) {

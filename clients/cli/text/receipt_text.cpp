@@ -145,13 +145,7 @@ std::string receipt_json(const CorrectedProgram& program, const std::optional<To
                          {"file", program.largest_step_file},
                          {"line", program.largest_step_line}}},
                        {"inserted_lines", inserted}};
-  if (verdict) {
-    head["tolerance"] = {{"tolerance_mm", verdict->tolerance_mm},
-                         {"targets", verdict->targets},
-                         {"inside_before", verdict->before},
-                         {"inside_after", verdict->after},
-                         {"expected_inside_after", verdict->expected_after}};
-  }
+  if (verdict) head["tolerance"] = tolerance_json(*verdict);
   // A line a target: all of them at once as a JSON value would take hundreds of megabytes of a long program.
   std::string text = json_text(head);
   text.erase(text.rfind("\n}"));
