@@ -50,6 +50,14 @@ struct Arguments {
   std::optional<std::uint16_t> http_port;
 };
 
+/// What it says instead of the server file.
+void put_over(ServerConfig& config, const Arguments& arguments) {
+  if (arguments.store) config.store = *arguments.store;
+  if (arguments.port) config.dds.port = *arguments.port;
+  if (arguments.domain) config.dds.domain = *arguments.domain;
+  if (arguments.http_port) config.http.port = *arguments.http_port;
+}
+
 int exit_code(const Error& error) {
   switch (error.code) {
     case ErrorCode::kUsage:
@@ -220,9 +228,10 @@ void add_cells(const ServedCells& cells, DdsService& service, Trainer& trainer) 
 
 /// Reads the server file again and takes on what can change while it serves. Of a file that is refused nothing is
 /// taken.
-void reload(const std::string& path, ServerConfig& config, DdsService& service, Trainer& trainer) {
+void reload(const Arguments& arguments, ServerConfig& config, DdsService& service, Trainer& trainer) {
   tell_manager_reloading();
-  const ServerReading read = read_server(path);
+  ServerReading read = read_server(arguments.config);
+  put_over(read.config, arguments);
   for (const Error& problem : read.problems)
     tell(LogLevel::kError, "reload_refused", "everything stays as it was: " + sentence(problem));
   if (read.problems.empty()) {
@@ -245,7 +254,7 @@ void reload(const std::string& path, ServerConfig& config, DdsService& service, 
 /// The parts of a server that serves, and what is told of them.
 struct Serving {
   ServerConfig& config;
-  const std::string& path;
+  const Arguments& arguments;
   DdsService& service;
   Trainer& trainer;
   const ModelRegistry& registry;
@@ -261,7 +270,7 @@ int watch(Signals& signals, const Serving& serving) {
   for (;;) {
     const Signals::News news = signals.wait(tick);
     if (news.ends != 0) return news.ends;
-    if (news.reload) reload(serving.path, serving.config, serving.service, serving.trainer);
+    if (news.reload) reload(serving.arguments, serving.config, serving.service, serving.trainer);
     if (serving.service.movement().still.empty()) tell_manager_alive();
     const std::string status = fmt::format("{} of {} cells have a model, {} jobs wait", serving.registry.cells_served(),
                                            serving.trainer.cells().size(), serving.trainer.queued_jobs());
@@ -271,7 +280,7 @@ int watch(Signals& signals, const Serving& serving) {
 }
 
 /// Serves until a signal ends it.
-Status serve(ServerConfig config, const std::string& path) {
+Status serve(ServerConfig config, const Arguments& arguments) {
   Signals signals;  // before any thread starts
   auto store = Store::open(config.store);
   if (!store) return tl::make_unexpected(store.error());
@@ -322,7 +331,7 @@ Status serve(ServerConfig config, const std::string& path) {
                    config.cells.size(), config.dds.address, config.dds.port, config.dds.domain, config.store, pages));
   tell_manager_ready("serves");
 
-  const int ended_by = watch(signals, {config, path, service, trainer, registry});
+  const int ended_by = watch(signals, {config, arguments, service, trainer, registry});
   tell(LogLevel::kInfo, "stopping", fmt::format("stopping: {}", ::strsignal(ended_by)));
   tell_manager_stopping();
   http.set_phase(ServerPhase::kStopping);
@@ -336,14 +345,11 @@ int run(const Arguments& arguments) {
   ServerReading server = read_server(arguments.config);
   ServerConfig& config = server.config;
   config.trainer.compute.program = {"/proc/self/exe", kComputeWord};  // this very file, also where it was replaced
-  if (arguments.store) config.store = *arguments.store;
-  if (arguments.port) config.dds.port = *arguments.port;
-  if (arguments.domain) config.dds.domain = *arguments.domain;
-  if (arguments.http_port) config.http.port = *arguments.http_port;
+  put_over(config, arguments);
   if (arguments.check) return check(server, arguments.config);
   if (!server.problems.empty()) return refuse_start(server.problems);
   if (auto log = start_log(config.log); !log) return refuse(log.error());
-  const Status served = serve(config, arguments.config);
+  const Status served = serve(config, arguments);
   if (served) return 0;
   if (!config.log.file.empty()) tell(LogLevel::kError, "start_refused", sentence(served.error()));
   return refuse(served.error());

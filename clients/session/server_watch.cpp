@@ -97,12 +97,12 @@ bool ServerWatch::is_settled(const KnownServer& chosen, const std::string& cell)
 }
 
 std::optional<KnownServer> ServerWatch::wait_for_server(const std::string& cell, const std::string& avoid,
-                                                        bool to_change, Clock::time_point deadline,
+                                                        bool of_writer, Clock::time_point deadline,
                                                         const std::function<bool(const KnownServer&)>& reachable) {
   MutexLock lock(mutex_);
   const KnownServer* chosen = nullptr;
   const auto look = [&]() TRAMMEL_REQUIRES(mutex_) {
-    chosen = choose(cell, avoid, to_change, reachable);
+    chosen = choose(cell, avoid, of_writer, reachable);
     return chosen != nullptr;
   };
   wait_for_first(lock, std::min(deadline, Clock::now() + wire::kStatusLost),
@@ -127,12 +127,12 @@ void ServerWatch::was_slow(const std::string& server) {
   slow_[server] = Clock::now();
 }
 
-const KnownServer* ServerWatch::choose(const std::string& cell, const std::string& avoid, bool to_change,
+const KnownServer* ServerWatch::choose(const std::string& cell, const std::string& avoid, bool of_writer,
                                        const std::function<bool(const KnownServer&)>& reachable) const {
   const auto merit = [&](const KnownServer& server) TRAMMEL_REQUIRES(mutex_) {
     const auto replica = replicas_.find(server.id());
     const bool writes = replica != replicas_.end() && replica->second.second.role() == wire::REPLICA_WRITER;
-    const std::uint64_t epoch = to_change && writes ? replica->second.second.epoch() : 0;
+    const std::uint64_t epoch = of_writer && writes ? replica->second.second.epoch() : 0;
     const auto slow = slow_.find(server.id());
     const bool is_quick = slow == slow_.end() || slow->second < server.heard;
     return std::tuple(serves(server, cell), Clock::now() - server.heard < wire::kStatusLost, server.id() != avoid,

@@ -49,12 +49,12 @@ class ServerWatch {
                                                                  wire::dds::Subscriber& subscriber, std::size_t named);
 
   /// Chooses among the servers that `reachable` accepts: preferably one that serves `cell`, then one that published its
-  /// status lately, then one that is not `avoid`, then (`to_change`) the one that writes, then one that was not slower
+  /// status lately, then one that is not `avoid`, then (`of_writer`) the one that writes, then one that was not slower
   /// than another one lately (was_slow()). Waits until `deadline` for the first server, less long where all that
   /// are there speak another contract. One that does not serve the cell is taken only when no other can be expected:
   /// all named servers are known, or kStatusLost is over.
   [[nodiscard]] std::optional<KnownServer> wait_for_server(const std::string& cell, const std::string& avoid,
-                                                           bool to_change, Clock::time_point deadline,
+                                                           bool of_writer, Clock::time_point deadline,
                                                            const std::function<bool(const KnownServer&)>& reachable);
   /// The same without waiting, and never `avoid` nor one that does not serve the cell.
   [[nodiscard]] std::optional<KnownServer> another_server(const std::string& cell, const std::string& avoid,
@@ -92,7 +92,7 @@ class ServerWatch {
   void on_model(const wire::ModelStatus* status, const std::string& participant, double written_unix_s);
   void on_progress(const wire::TrainingProgress* progress);
   void on_replica(const wire::ReplicaStatus* status, const std::string& participant);
-  [[nodiscard]] const KnownServer* choose(const std::string& cell, const std::string& avoid, bool to_change,
+  [[nodiscard]] const KnownServer* choose(const std::string& cell, const std::string& avoid, bool of_writer,
                                           const std::function<bool(const KnownServer&)>& reachable) const
       TRAMMEL_REQUIRES(mutex_);
   /// Whether `chosen` serves the cell, or no named server does.

@@ -202,12 +202,12 @@ struct Session::Participant {
     return accepted(*reply);
   }
 
-  /// From `server`; empty: any.
+  /// From `server`; empty: from the one that writes, if it is there.
   [[nodiscard]] Result<wire::ReadModelsReply> read(const std::string& cell, const std::string& server,
                                                    wire::ReadKind what, wire::ReadModelsRequest request = {}) {
     request.about().cell(cell);
     request.what(what);
-    return call<wire::ReadModels>(request, {cell, server, false});
+    return call<wire::ReadModels>(request, {cell, server, false, true});
   }
 
   /// From every server.
@@ -305,7 +305,8 @@ struct Session::Participant {
       typename Operation::Request::type request;
       request.about(to_wire(context));
       for (std::size_t i = first; i < first + count; ++i) put(request).push_back(items[i]);
-      const auto reply = call<Operation>(request, {context.cell, {}, false});
+      const bool of_a_version = context.model.starts_with('@');  // which each server counts for itself
+      const auto reply = call<Operation>(request, {context.cell, {}, false, of_a_version});
       if (!reply) return tl::make_unexpected(reply.error());
       if (get(*reply).size() != count) {
         return failure(ErrorCode::kInternal, "server {} answered {} items for {}", reply->header().server().to_string(),

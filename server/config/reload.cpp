@@ -62,6 +62,11 @@ ReloadPlan plan_reload(const ServerConfig& present, const ServerConfig& file) {
   }
 
   leave("server", present.dds.server_id, file.dds.server_id, &plan.later);
+  leave("store", present.store, file.store, &plan.later);
+  leave("dds: address", present.dds.address, file.dds.address, &plan.later);
+  leave("dds: port", present.dds.port, file.dds.port, &plan.later);
+  leave("dds: domain", present.dds.domain, file.dds.domain, &plan.later);
+  leave("http: port", present.http.port, file.http.port, &plan.later);
   leave("record", present.dds.record, file.dds.record, &plan.later);
   leave("models_in_memory_mb", present.models_in_memory, file.models_in_memory, &plan.later);
   leave("dds: peer_ports", present.dds.peer_ports, file.dds.peer_ports, &plan.later);

@@ -16,8 +16,8 @@ struct ReloadPlan {
 
 /// Takes on: cells that are added (one that is left out, or whose file or robot file has changed: with the next start);
 /// level and format of the log; of `dds` how much may wait (client_requests, client_mb, queued_requests,
-/// queued_mb, cell_share); of `trainer` queue_capacity and keep_models, keep_batches, keep_answers. Options of the
-/// command line (store, ports, domain) stand in `present`, and what `file` says instead is no change.
+/// queued_mb, cell_share); of `trainer` queue_capacity and keep_models, keep_batches, keep_answers. What the command
+/// line says instead of the file is to stand in both.
 [[nodiscard]] ReloadPlan plan_reload(const ServerConfig& present, const ServerConfig& file);
 
 }  // namespace trammel

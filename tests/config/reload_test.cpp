@@ -72,17 +72,19 @@ TEST(Reload, CellsForWhichTheWireHasNoRoomComeWithTheNextStart) {
   EXPECT_EQ(plan.config.cells.size(), 1024u);
 }
 
-TEST(Reload, OptionsOfTheCommandLineAreNoChange) {
-  ServerConfig present = config();
-  present.dds.port = 20000;
-  present.dds.domain = 7;
-  present.store = "other.db";
-  present.http.port = 20001;
-  const ReloadPlan plan = plan_reload(present, config());
-  EXPECT_TRUE(plan.now.empty() && plan.later.empty());
-  EXPECT_EQ(plan.config.dds.port, 20000);
-  EXPECT_EQ(plan.config.store, "other.db");
-  EXPECT_EQ(plan.config.http.port, 20001);
+TEST(Reload, WhereItIsReachedAndWhereItStoresChangesWithTheNextStartAndIsNamed) {
+  ServerConfig file = config();
+  file.store = "other.db";
+  file.dds.address = "127.0.0.2";
+  file.dds.port = 20000;
+  file.dds.domain = 7;
+  file.http.port = 20001;
+  const ReloadPlan plan = plan_reload(config(), file);
+  EXPECT_TRUE(plan.now.empty());
+  EXPECT_EQ(plan.later, (std::vector<std::string>{"store", "dds: address", "dds: port", "dds: domain", "http: port"}));
+  EXPECT_EQ(plan.config.store, config().store);
+  EXPECT_EQ(plan.config.dds.port, config().dds.port);
+  EXPECT_EQ(plan.config.http.port, config().http.port);
 }
 
 }  // namespace

@@ -103,6 +103,20 @@ TEST_F(ReplayTest, ANumberThatWasChangedAfterwardsIsNamedAndHalfALastLineIsLeftO
       << told.dump();
 }
 
+TEST_F(ReplayTest, AnotherDomainAnotherBranchAndAnErrorThatWasNotKnownAreDifferencesToo) {
+  const std::string text = test::read_file(only_record());
+  const auto differs = [&](const std::string& now, const std::string& then) {
+    const std::size_t at = text.find(now);
+    EXPECT_NE(at, std::string::npos) << now;
+    const auto replayed = replay(1, folder_.write("then.jsonl", std::string(text).replace(at, now.size(), then)));
+    EXPECT_EQ(replayed.exit_code, 1) << replayed.err;
+    return json::parse(replayed.out).at("different");
+  };
+  EXPECT_EQ(differs("\"in_domain\":true", "\"in_domain\":false"), 1);
+  EXPECT_EQ(differs("\"commanded_joints_rad\":[", "\"commanded_joints_rad\":[7,"), 1);
+  EXPECT_EQ(differs("\"error_after_mm\":0.", "\"error_after_mm\":null,\"was\":0."), 1);
+}
+
 TEST_F(ReplayTest, WhatIsNoRecordIsRefusedWithItsLine) {
   const auto refused = replay(1, folder_.write("no.jsonl", "{\"record\":1}\n"));
   EXPECT_EQ(refused.exit_code, 3) << refused.out;

@@ -205,6 +205,41 @@ TEST_F(ReplicasTest, AFollowerThatWasAwayGetsTheBatchesThatItLacks) {
   EXPECT_TRUE(wait_until_it_keeps(second_, "lt-1"));
 }
 
+TEST_F(ReplicasTest, ABatchThatAFollowerRefusesKeepsNoOtherOneFromIt) {
+  give(0, "role: writer, batches_to_followers: true, copy_timeout_s: 1");
+  second_.start();  // alone: it gets a batch of the same name
+  const auto alone = client::Session::open(second_.session_options());
+  ASSERT_TRUE(alone) << sentence(alone.error());
+  ASSERT_TRUE((*alone)->submit_measurements("cell-7", "lt-1", test::virtual_batch_csv(60, 9)));
+  EXPECT_EQ(second_.stop(), 0);
+  give(1, fmt::format("role: follower, of: {}", first_.name()));
+  first_.start();
+  const auto session = client::Session::open(first_.session_options());
+  ASSERT_TRUE(session) << sentence(session.error());
+  ASSERT_TRUE((*session)->submit_measurements("cell-7", "lt-1", test::virtual_batch_csv(60, 1)));
+  ASSERT_TRUE((*session)->submit_measurements("cell-7", "lt-2", test::virtual_batch_csv(60, 2)));
+  second_.start();
+  EXPECT_TRUE(wait_until_it_keeps(second_, "lt-2"));
+}
+
+TEST_F(ReplicasTest, WhatFollowersMayLackIsReadFromTheOneThatWrites) {
+  give(0, fmt::format("role: follower, of: {}", second_.name()));
+  give(1, "role: writer");
+  start_both();
+  ASSERT_TRUE(wait_until([](const ServerStatus&, const ServerStatus& second) { return second.replica->writes; }));
+  learn("lt-1", 1);
+  ASSERT_TRUE(wait_until(same));
+  for (int i = 0; i < 3; ++i) {
+    const auto batch = session_->export_batch("cell-7", "lt-1");
+    ASSERT_TRUE(batch) << sentence(batch.error());
+    EXPECT_EQ(*batch, test::virtual_batch_csv(60, 1));
+  }
+  second_.kill();
+  const auto models = session_->models("cell-7");
+  ASSERT_TRUE(models) << "of the follower, where no other one is there: " << sentence(models.error());
+  EXPECT_EQ(models->size(), 1u);
+}
+
 TEST_F(ReplicasTest, WhenTheWriterIsKilledTheFollowerAnswersAtOnce) {
   give_usual_parts();
   start_both();

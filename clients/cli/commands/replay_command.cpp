@@ -17,7 +17,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr std::size_t kTold = 10;  // of those that differ, the largest
+constexpr std::size_t kTold = 10;        // of those that differ, the largest
+constexpr double kAnotherBranch = 1e-3;  // rad, of a joint whose pose is the same
 
 struct ReplayArguments {
   std::string model, json, next_poses;
@@ -27,9 +28,10 @@ struct ReplayArguments {
   ServiceOptions service;
 };
 
-/// An item whose answer is another one now.
+/// How an item is answered now, beside then.
 struct Different {
-  double by_mm = 0;  ///< infinite where one has a pose to command and the other has none
+  double by_mm = 0;                 ///< infinite where one has a number or a pose to command and the other has none
+  bool is_of_another_kind = false;  ///< however small that is: status, domain, branch
   std::string what;
 };
 
@@ -43,10 +45,6 @@ struct Replayed {
   std::size_t of_other_models = 0;   ///< requests that another model answered then
 };
 
-double distance(const std::array<double, 3>& a, const std::array<double, 3>& b) {
-  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
-}
-
 double distance(const client::PoseMm& a, const client::PoseMm& b) {
   return std::hypot(a.x_mm - b.x_mm, a.y_mm - b.y_mm, a.z_mm - b.z_mm);
 }
@@ -55,27 +53,54 @@ bool has_command(const client::CorrectedTarget& target) {
   return target.status == "ok" || target.status == "out_of_domain";
 }
 
+/// What neither knows does not differ.
+double apart(double a, double b) {
+  if (std::isfinite(a) && std::isfinite(b)) return std::abs(a - b);
+  return std::isfinite(a) == std::isfinite(b) ? 0 : INFINITY;
+}
+
+double apart(const std::array<double, 3>& a, const std::array<double, 3>& b) {
+  return std::hypot(apart(a[0], b[0]), apart(a[1], b[1]), apart(a[2], b[2]));
+}
+
+const char* domain_word(bool in_domain) { return in_domain ? "in domain" : "out of domain"; }
+
 Different compared(const RecordedPose& then, const client::PredictedError& now) {
-  const double error = distance(then.error_mm, {now.dx_mm, now.dy_mm, now.dz_mm});
-  const double spread = distance(then.true_stddev_mm, {now.slx_mm, now.sly_mm, now.slz_mm});
-  return {std::max(error, spread),
+  const double error = apart(then.error_mm, {now.dx_mm, now.dy_mm, now.dz_mm});
+  const double spread = apart(then.true_stddev_mm, {now.slx_mm, now.sly_mm, now.slz_mm});
+  if (then.in_domain != now.in_domain)
+    return {std::max(error, spread), true,
+            fmt::format("{} then, {} now", domain_word(then.in_domain), domain_word(now.in_domain))};
+  return {std::max(error, spread), false,
           fmt::format("the error by {:.3g} mm, its standard deviation by {:.3g} mm", error, spread)};
+}
+
+/// rad; infinite where there are not as many of them.
+double joints_apart(const std::vector<double>& a, const std::vector<double>& b) {
+  if (a.size() != b.size()) return INFINITY;
+  double most = 0;
+  for (std::size_t j = 0; j < a.size(); ++j) most = std::max(most, apart(a[j], b[j]));
+  return most;
 }
 
 Different compared(const client::CorrectedTarget& then, const client::CorrectedTarget& now) {
   if (then.status != now.status)
-    return {has_command(then) == has_command(now) ? distance(then.commanded, now.commanded) : INFINITY,
+    return {has_command(then) == has_command(now) ? distance(then.commanded, now.commanded) : INFINITY, true,
             fmt::format("{} then, {} now", then.status, now.status)};
-  if (!has_command(then)) return {0, ""};
+  if (!has_command(then)) return {};
   const double moved = distance(then.commanded, now.commanded);
-  const double expected = std::abs(then.error_after_mm - now.error_after_mm);
-  return {std::max(moved, expected),
-          fmt::format("the commanded pose by {:.3g} mm, the error expected by {:.3g} mm", moved, expected)};
+  const double expected =
+      std::max({apart(then.error_before_mm, now.error_before_mm), apart(then.error_after_mm, now.error_after_mm),
+                apart(then.sigma_mm, now.sigma_mm)});
+  const double turned = joints_apart(then.q_rad, now.q_rad);
+  return {std::max(moved, expected), turned > kAnotherBranch,
+          fmt::format("the commanded pose by {:.3g} mm, its joints by {:.3g} rad, the errors expected by {:.3g} mm",
+                      moved, turned, expected)};
 }
 
 void note(Replayed& all, const RecordedCall& call, std::size_t item, Different different, double tolerance_mm) {
   ++all.items;
-  const bool is_same = different.by_mm <= tolerance_mm && different.what.find(" then, ") == std::string::npos;
+  const bool is_same = different.by_mm <= tolerance_mm && !different.is_of_another_kind;
   if (is_same) return void(all.largest_mm = std::max(all.largest_mm, different.by_mm));
   ++all.different;
   all.largest_mm = std::max(all.largest_mm, different.by_mm);

@@ -1,10 +1,12 @@
 #include "server/dds/records/request_recorder.h"
 
+#include <fcntl.h>
 #include <pthread.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <utility>
 #include <vector>
@@ -15,7 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kQueueBytes = std::size_t{64} << 20;
-constexpr int kFiles = 8;  // that share the room
+constexpr std::size_t kFiles = 8;               // that share the room, where all are full
+constexpr std::uintmax_t kLeastOfAFile = 4096;  // that it takes of the disk
 constexpr int kNiceness = 5;
 constexpr const char* kBegin = "requests-";
 constexpr const char* kEnd = ".jsonl";
@@ -32,12 +35,45 @@ std::int64_t number_of(const fs::path& file) {
 /// Oldest first.
 std::vector<std::pair<std::int64_t, fs::path>> files_in(const std::string& folder) {
   std::vector<std::pair<std::int64_t, fs::path>> files;
-  std::error_code unknown;
-  for (const auto& entry : fs::directory_iterator(folder, unknown)) {
-    if (const std::int64_t number = number_of(entry.path()); number > 0) files.emplace_back(number, entry.path());
+  std::error_code wrong;
+  for (auto entry = fs::directory_iterator(folder, wrong); !wrong && entry != fs::directory_iterator();
+       entry.increment(wrong)) {
+    if (const std::int64_t number = number_of(entry->path()); number > 0) files.emplace_back(number, entry->path());
   }
   std::sort(files.begin(), files.end());
   return files;
+}
+
+fs::path path_of(const RecordOptions& options, std::int64_t number) {
+  return fs::path(options.folder) / fmt::format("{}{:09}{}", kBegin, number, kEnd);
+}
+
+std::uintmax_t room_of(const RecordOptions& options) { return static_cast<std::uintmax_t>(options.max_mb) << 20; }
+
+std::uintmax_t taken_by(const fs::path& file) {
+  std::error_code gone;
+  const std::uintmax_t bytes = fs::file_size(file, gone);
+  return gone ? 0 : std::max(bytes, kLeastOfAFile);
+}
+
+/// Lets the oldest files go until so many bytes more find room.
+void make_room(const RecordOptions& options, std::uintmax_t bytes) {
+  const auto files = files_in(options.folder);
+  std::uintmax_t taken = bytes;
+  for (const auto& [number, file] : files) taken += taken_by(file);
+  for (const auto& [number, file] : files) {
+    if (taken <= room_of(options)) return;
+    taken -= taken_by(file);
+    std::error_code unknown;
+    fs::remove(file, unknown);
+  }
+}
+
+/// For the daemon's user only from its first moment on; never a file that is there already.
+bool make_file(const fs::path& path) {
+  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, S_IRUSR | S_IWUSR);
+  if (file >= 0) ::close(file);
+  return file >= 0;
 }
 
 }  // namespace
@@ -51,7 +87,6 @@ Result<std::unique_ptr<RequestRecorder>> RequestRecorder::open(const RecordOptio
   std::unique_ptr<RequestRecorder> recorder(new RequestRecorder(options));
   const auto files = files_in(options.folder);
   recorder->number_ = files.empty() ? 0 : files.back().first;
-  recorder->next_file();
   RequestRecorder* self = recorder.get();
   recorder->thread_ = std::jthread([self](const std::stop_token& stop) { self->run(stop); });
   return recorder;
@@ -94,28 +129,38 @@ void RequestRecorder::run(const std::stop_token& stop) {
 }
 
 void RequestRecorder::write(const std::string& line) {
-  if (file_bytes_ > 0 && file_bytes_ + line.size() > (static_cast<std::size_t>(options_.max_mb) << 20) / kFiles)
+  const std::size_t bytes = line.size() + 1, share = room_of(options_) / kFiles;
+  if (bytes > room_of(options_)) return void(++dropped_);
+  if (!file_.is_open() || (file_bytes_ > 0 && file_bytes_ + bytes > share)) {
+    make_room(options_, std::max(share, bytes));
     next_file();
+  }
   file_ << line << '\n' << std::flush;
   if (file_) {
-    file_bytes_ += line.size() + 1;
+    file_bytes_ += bytes;
     return;
   }
   ++dropped_;
-  next_file();  // a disk that is full now may not be full later
+  give_up_file();
 }
 
 void RequestRecorder::next_file() {
-  auto files = files_in(options_.folder);
-  for (std::size_t i = 0; i + kFiles <= files.size(); ++i) {
-    std::error_code unknown;
-    fs::remove(files[i].second, unknown);
-  }
-  const fs::path path = fs::path(options_.folder) / fmt::format("{}{:09}{}", kBegin, ++number_, kEnd);
-  file_ = std::ofstream(path, std::ios::binary | std::ios::trunc);
-  std::error_code unknown;
-  fs::permissions(path, fs::perms::owner_read | fs::perms::owner_write, unknown);
   file_bytes_ = 0;
+  bool made = false;
+  do {
+    made = make_file(path_of(options_, ++number_));
+  } while (!made && errno == EEXIST);  // somebody else's
+  file_ = made ? std::ofstream(path_of(options_, number_), std::ios::binary | std::ios::app) : std::ofstream();
+}
+
+void RequestRecorder::give_up_file() {
+  file_ = std::ofstream();
+  std::error_code unknown;
+  if (file_bytes_ > 0) {
+    fs::resize_file(path_of(options_, number_), file_bytes_, unknown);
+  } else {
+    fs::remove(path_of(options_, number_--), unknown);
+  }
 }
 
 }  // namespace trammel

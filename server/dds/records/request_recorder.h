@@ -47,8 +47,9 @@ class RequestRecorder {
   explicit RequestRecorder(RecordOptions options) : options_(std::move(options)) {}
   void run(const std::stop_token& stop);
   void write(const std::string& line);
-  /// Begins the next file, and lets the oldest ones go.
   void next_file();
+  /// What the disk has not taken whole goes; what was written before stays. A disk that is full now may not be later.
+  void give_up_file();
 
   const RecordOptions options_;
   std::atomic<std::uint64_t> dropped_{0};

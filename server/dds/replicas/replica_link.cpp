@@ -536,6 +536,7 @@ void ReplicaLink::run_copies(const std::stop_token& stop) {
 }
 
 bool ReplicaLink::bring_up_to_date(const std::string& follower, const std::stop_token& stop) {
+  bool has_all = true;
   for (const auto& [cell, description] : trainer_.cells()) {
     const std::vector<std::string> followers = followers_of(cell);
     if (std::find(followers.begin(), followers.end(), follower) == followers.end()) continue;
@@ -543,10 +544,14 @@ bool ReplicaLink::bring_up_to_date(const std::string& follower, const std::stop_
       if (stop.stop_requested()) return false;
       if (record.pruned || record.discarded) continue;
       const auto batch = store_.batch(cell, record.id);
-      if (batch && !send_copies({follower}, cell, record.id, batch->csv).empty()) return false;
+      if (!batch) continue;
+      const std::map<std::string, Error> wrong = send_copies({follower}, cell, record.id, batch->csv);
+      if (wrong.empty()) continue;
+      if (wrong.begin()->second.code == ErrorCode::kUnreachable) return false;
+      has_all = false;  // a batch that it refuses keeps none of the next ones from it
     }
   }
-  return true;
+  return has_all;
 }
 
 }  // namespace trammel

@@ -28,6 +28,17 @@ JobOutcome outcome_of(const GateVerdict& verdict) {
   return outcome;
 }
 
+/// The model that is stored with this hash.
+Result<ServedModelPtr> load_by_hash(const Store& store, ModelRegistry& registry, const std::string& cell,
+                                    const std::string& hash) {
+  const auto stored = store.models(cell);
+  if (!stored) return tl::make_unexpected(stored.error());
+  for (const StoredModel& one : *stored) {
+    if (one.hash == hash) return registry.version(cell, one.version);
+  }
+  return failure(ErrorCode::kNotFound, "cell {} has no model {}", cell, hash).of("hash");
+}
+
 }  // namespace
 
 ModelHistory::ModelHistory(const CellBook& cells, Store& store, ModelRegistry& registry)
@@ -218,14 +229,18 @@ Result<int> ModelHistory::adopt(const std::string& cell, const VersionInForce& d
     model = std::move(*read);
   }
   if (const auto served = find_cell(cells_.now(), cell); !served) return tl::make_unexpected(served.error());
+  // Before it is remembered: a model that cannot be loaded must not count as in force.
+  ServedModelPtr stored;
+  if (!model) {
+    auto loaded = load_by_hash(store_, registry_, cell, decided.hash);
+    if (!loaded) return tl::make_unexpected(loaded.error());
+    stored = std::move(*loaded);
+  }
   const MutexLock lock(changes_of(cell));
   if (decides_) return failure(ErrorCode::kConflict, "cell {}: this server decides itself", cell).of("cell");
   const auto version = store_.adopt(cell, decided, model ? &*model : nullptr, by);
   if (!version || registry_.version_in_force(cell) == *version) return version;
-  auto served = model ? Result<ServedModelPtr>(registry_.reclaimed({cell, *version, std::move(*model)}))
-                      : registry_.version(cell, *version);
-  if (!served) return tl::make_unexpected(served.error());
-  put_in_force(std::move(*served));
+  put_in_force(stored ? std::move(stored) : registry_.reclaimed({cell, *version, std::move(*model)}));
   return version;
 }
 
