@@ -42,6 +42,17 @@ TEST(ReplicaRole, AChangedFilePromotesAndThePromotionIsNewerThanAnyDecision) {
   EXPECT_EQ(ReplicaRole("b", writer(), kStart).begin(record).record.epoch, ReplicaRole::kPromotion);
 }
 
+TEST(ReplicaRole, WhatAPersonDecidedIsDecidedAgainUntilTheStoreRemembersIt) {
+  ReplicaRole role("b", follower(), kStart);
+  const ReplicaRecord record{17, false, "a", "follower of a"};
+  const RoleDecision told = role.told(record, writer(), {});
+  ASSERT_TRUE(told.record.writes);
+  const RoleDecision again = role.decide(record, {}, kLater);
+  EXPECT_EQ(again.record, told.record) << "as if the disk had been full";
+  EXPECT_FALSE(again.why.empty());
+  EXPECT_EQ(role.decide(told.record, {}, kLater).record, told.record);
+}
+
 TEST(ReplicaRole, AnUnchangedFileDecidesNothingWhileAnotherOneWrites) {
   ReplicaRole role("a", writer(), kStart);
   const ReplicaRecord record{ReplicaRole::kPromotion, false, "b", "writer"};

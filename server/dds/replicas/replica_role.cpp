@@ -44,17 +44,17 @@ RoleDecision ReplicaRole::begin(const std::optional<ReplicaRecord>& remembered) 
 
 RoleDecision ReplicaRole::told(const ReplicaRecord& record, const ReplicaOptions& options,
                                const std::vector<OtherReplica>& others) {
-  const std::string before = part();
   options_ = options;
   const bool nobody_writes = first_writer(others) == nullptr;
   const bool asks_again = options_.role == Role::kWriter && !record.writes && nobody_writes;
-  if (part() == before && !asks_again) return {record};
+  if (part() == record.told && !asks_again) return {record};
   if (options_.role == Role::kFollower) return {{record.epoch, false, options_.of, part()}, "the server file says so"};
   if (!record.writes) return {promoted(record, others), "the server file says so now"};
   return {{record.epoch, true, "", part()}};
 }
 
 RoleDecision ReplicaRole::decide(const ReplicaRecord& record, const std::vector<OtherReplica>& others, Time now) {
+  if (record.told != part()) return told(record, ReplicaOptions(options_), others);  // the store could not remember it
   return record.writes ? as_writer(record, others) : as_follower(record, others, now);
 }
 
