@@ -92,7 +92,8 @@ int check(const ServerReading& server, const std::string& path) {
   LineOutput said(STDERR_FILENO);
   for (const std::string& dark : found.dark) said.write(fmt::format("trammeld: {}\n", shown(dark)));
   if (!found.dark.empty()) return kExitDark;
-  fmt::print("{}: good, {} cells\n", path, server.config.cells.size());
+  const std::size_t cells = server.config.cells.size();
+  fmt::print("{}: good, {} cell{}\n", path, cells, cells == 1 ? "" : "s");
   return 0;
 }
 
@@ -381,7 +382,11 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : trammel::kExitUsage;
+    if (error.get_exit_code() == 0) return app.exit(error);
+    fmt::print(stderr,
+               "trammeld: {}; usage: trammeld --config SERVER.yaml [--check]; trammeld --help tells all options\n",
+               trammel::shown(error.what()));
+    return trammel::kExitUsage;
   }
   trammel::ignore_what_calls_report();
   trammel::give_large_blocks_back();

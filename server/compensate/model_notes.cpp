@@ -159,10 +159,29 @@ void add_sessions(const CompensatedModel::Parts& parts, std::vector<std::string>
   }
 }
 
+/// How many numbers the training measured: coordinates, turns and distances.
+long measured_numbers(const Evaluation& training) {
+  const long turns = training.orientation ? 3L * training.orientation->poses : 0;
+  return 3L * training.poses + turns + (training.gauges ? training.gauges->rows : 0);
+}
+
+/// A fit of r combinations to n numbers leaves sqrt(1 - r/n) of their rms: below n = 2 r more than a third is hidden.
+void add_too_few_poses(const CompensatedModel::Parts& parts, std::vector<std::string>& notes) {
+  const long numbers = measured_numbers(parts.training);
+  if (!parts.provenance.refits.empty() || parts.training.poses == 0 || numbers >= 2L * parts.rank) return;
+  const double each = static_cast<double>(numbers) / parts.training.poses;
+  const double enough = std::ceil(2.0 * static_cast<double>(parts.parameters.size()) / each);
+  notes.push_back(fmt::format(
+      "{} combinations of parameters were fitted to {} measured numbers of {} poses: what is left at these poses is "
+      "small by that alone and does not tell how well others are met; train on {:.0f} poses or more",
+      parts.rank, numbers, parts.training.poses, enough));
+}
+
 }  // namespace
 
 std::vector<std::string> notes_of(const CompensatedModel& model) {
   std::vector<std::string> notes;
+  add_too_few_poses(model.parts(), notes);
   add_changes(model, notes);
   add_sessions(model.parts(), notes);
   add_what_data_added(model.parts(), notes);

@@ -121,11 +121,11 @@ void add_replica(MetricFamilies& out, const ReplicaFigures& replica) {
             replica.writes ? 1 : 0);
   out.gauge("trammel_replica_epoch", "Of the last decision of what is in force that it knows.", number(replica.epoch));
   out.gauge("trammel_replica_others", "Other servers of the same cells that are there.", number(replica.others));
-  for (const char* kind : {"role", "follow", "divergence", "batches"}) {
+  for (const char* kind : {"role", "follow", "divergence", "batches", "name"}) {
     const bool is_there = std::find(replica.troubles.begin(), replica.troubles.end(), kind) != replica.troubles.end();
     out.gauge("trammel_replica_trouble",
               "1: role: two or none write; follow: a model is not taken over; divergence: two models at one epoch; "
-              "batches: a follower may lack some.",
+              "batches: a follower may lack some; name: another server has its name.",
               is_there ? 1 : 0, {{"kind", kind}});
   }
 }

@@ -186,6 +186,18 @@ TEST_F(ReplicasOnALine, BothWriteWhileTheLineIsCutThenOneStopsAndNothingIsLost) 
   EXPECT_NE(batches_at(1).find("there"), std::string::npos);
 }
 
+TEST_F(ReplicasOnALine, AServerFileThatWasCopiedWithItsNameIsSaidOnBothHosts) {
+  std::string& second = files_.at(1);
+  second.replace(second.find(daemons_.at(1).name()), daemons_.at(1).name().size(), daemons_.at(0).name());
+  for (const std::size_t which : {0, 1}) give(which, "role: writer");
+  ASSERT_NO_FATAL_FAILURE(start_both());
+  const std::string words = fmt::format("another server is called {} too", daemons_.at(0).name());
+  for (const auto& server : running_) EXPECT_TRUE(server->wait_for_line(words, kLimit)) << said();
+  running_.at(1)->signal(SIGTERM);
+  EXPECT_EQ(running_.at(1)->wait(kLimit), 0);
+  EXPECT_TRUE(running_.at(0)->wait_for_line("over: " + words, kLimit)) << said();
+}
+
 /// A line that loses every twentieth frame, holds each back for 50 ms and lets them overtake each other.
 class ReplicasOnABadLine : public ReplicasOnALine {
  protected:

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <atomic>
+#include <deque>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -88,6 +89,25 @@ TEST_F(WatchingTest, MetricsReadinessAndPagesFollowACellFromItsFirstBatchOn) {
   EXPECT_NE(get("/cells/cell-7/models/1").body.find("lt-07"), std::string::npos);
   EXPECT_EQ(get("/nothing").code, 404);
   EXPECT_EQ(daemon_.stop(), 0) << daemon_.process().standard_error();
+}
+
+TEST_F(WatchingTest, TwoHundredSlowConnectionsThatRenewThemselvesKeepNoWatcherFromItsAnswer) {
+  const std::size_t threads = test::threads_of(daemon_.process().pid()).size();
+  std::deque<test::OpenConnection> slow;
+  for (int round = 0; round < 20; ++round) {
+    for (int i = 0; i < 200; ++i) {
+      slow.emplace_back(port()).send("GET /metr");
+      if (slow.size() > 200) slow.pop_front();
+    }
+    for (const auto& one : slow) one.send("i");
+    EXPECT_EQ(get("/healthz").code, 200) << round;
+    EXPECT_EQ(nlohmann::json::parse(get("/readyz").body)["state"], "dark") << round;
+    EXPECT_EQ(get("/metrics").code, 200) << round;
+  }
+  EXPECT_LE(test::threads_of(daemon_.process().pid()).size(), threads + 2);
+  EXPECT_GE(metric("trammel_http_shed_total"), 1000) << "so many were slow at the same time";
+  EXPECT_GT(metric("process_open_fds"), 0);
+  EXPECT_LT(metric("process_open_fds"), 200);
 }
 
 TEST_F(WatchingTest, AWorkerThatHangsIsToldBeforeTheDaemonEnds) {

@@ -94,6 +94,19 @@ TEST_F(ModelPage, ABiasThatDoesNotHelpIsSaidNotToAndIsNotGreen) {
   EXPECT_TRUE(has(helped, "<div class=\"tile compensated\">"));
 }
 
+TEST_F(ModelPage, ErrorsThatAreSmallByTheFitAloneAreSaidToTellNothing) {
+  const char* said = "does not tell how well others are met; train on ";
+  CompensatedModel::Parts parts = trained("none").parts();
+  parts.training.orientation.reset();
+  parts.training.gauges.reset();
+  parts.rank = 3 * parts.training.poses / 2;
+  EXPECT_FALSE(has(model_page(CompensatedModel::make(parts).value(), std::nullopt), said));
+  ++parts.rank;
+  EXPECT_TRUE(has(model_page(CompensatedModel::make(parts).value(), std::nullopt), said));
+  parts.training.orientation = OrientationFigures{parts.training.poses, 0.02, 0.002, 0.001, 0.934};
+  EXPECT_FALSE(has(model_page(CompensatedModel::make(parts).value(), std::nullopt), said));
+}
+
 TEST_F(ModelPage, SaysThatComplianceWithoutALoadDoesNothing) {
   TrainOptions options;
   options.level = "M3";

@@ -13,7 +13,8 @@ constexpr std::chrono::milliseconds kStep{250};        // at the longest; news w
 constexpr std::chrono::milliseconds kDivergent{3000};  // of two that are in step, longer than any copy takes
 constexpr std::chrono::seconds kCatchUpAgain{5};       // with a follower that did not say it has a batch
 constexpr std::chrono::seconds kModelComes{10};        // after it was told of
-constexpr std::size_t kCopiesAtOnce = 64;              // that may wait to be stored; the writer sends them again
+constexpr std::size_t kCopiesRemembered = 100'000;
+constexpr std::size_t kCopiesAtOnce = 64;  // that may wait to be stored; the writer sends them again
 
 template <typename State>
 Result<wire::dds::DataWriter*> make_writer(wire::dds::DomainParticipant& participant, wire::dds::Publisher& publisher,
@@ -32,7 +33,8 @@ Result<std::unique_ptr<ReplicaLink>> ReplicaLink::open(wire::dds::DomainParticip
                                                        const std::string& server, const ReplicaOptions& options,
                                                        Trainer& trainer, Store& store, ReplicaListener listener) {
   if (options.role == ReplicaOptions::Role::kAlone) return nullptr;
-  std::unique_ptr<ReplicaLink> link(new ReplicaLink(subscriber, server, options, trainer, store, std::move(listener)));
+  std::unique_ptr<ReplicaLink> link(new ReplicaLink(subscriber, server, wire::participant_of(participant.guid()),
+                                                    options, trainer, store, std::move(listener)));
   trainer.set_decides(false);  // until it has looked round
   link->begun_ = link->begin();
   if (const Status opened = link->open_endpoints(participant, snapshots); !opened)
@@ -43,10 +45,11 @@ Result<std::unique_ptr<ReplicaLink>> ReplicaLink::open(wire::dds::DomainParticip
   return link;
 }
 
-ReplicaLink::ReplicaLink(wire::dds::Subscriber& subscriber, std::string server, const ReplicaOptions& options,
-                         Trainer& trainer, Store& store, ReplicaListener listener)
+ReplicaLink::ReplicaLink(wire::dds::Subscriber& subscriber, std::string server, std::string participant,
+                         const ReplicaOptions& options, Trainer& trainer, Store& store, ReplicaListener listener)
     : subscriber_(subscriber),
       server_(std::move(server)),
+      participant_(std::move(participant)),
       trainer_(trainer),
       store_(store),
       listener_(std::move(listener)),
@@ -137,12 +140,15 @@ void ReplicaLink::on_status(const wire::ReplicaStatus* status, const std::string
     woken_ = true;
     if (status == nullptr) {
       std::erase_if(heard_, [&](const auto& entry) { return entry.second.participant == participant; });
+      namesakes_.erase(participant);
     } else if (const std::string name = status->server().to_string(); name != server_) {
       Heard& heard = heard_[name];
       const bool follows_anew = heard.status.follows().to_string() != status->follows().to_string();
       const bool has_more_cells = heard.status.cells().size() < status->cells().size();
       if (heard.participant != participant || follows_anew || has_more_cells) behind_.insert(name);
       heard = {participant, *status, Clock::now()};
+    } else if (participant != participant_) {
+      namesakes_.insert(participant);
     }
   }
   changed_.notify_all();
@@ -248,6 +254,7 @@ void ReplicaLink::step() {
   }
   epoch_ = view->record->epoch;
   forget_known_snapshots();
+  look_for_namesakes();
   look_for_divergence(there, *view);
   tell_troubles();
   publish(*view);
@@ -377,6 +384,19 @@ void ReplicaLink::keep_copies() {
     }
     copied_writer_->write(&answer);
   }
+}
+
+void ReplicaLink::look_for_namesakes() {
+  bool is_alone = true;
+  {
+    const MutexLock lock(mutex_);
+    is_alone = namesakes_.empty();
+  }
+  set_trouble("name", is_alone
+                          ? ""
+                          : fmt::format("another server is called {} too: neither sees what the other one decides; "
+                                        "give one of them another name (server in its file)",
+                                        server_));
 }
 
 void ReplicaLink::look_for_divergence(const std::vector<OtherReplica>& others, const ReplicaView& view) {
@@ -535,20 +555,32 @@ void ReplicaLink::run_copies(const std::stop_token& stop) {
   }
 }
 
+std::string ReplicaLink::participant_now(const std::string& server) const {
+  const MutexLock lock(mutex_);
+  const auto found = heard_.find(server);
+  return found == heard_.end() ? std::string() : found->second.participant;
+}
+
 bool ReplicaLink::bring_up_to_date(const std::string& follower, const std::stop_token& stop) {
   bool has_all = true;
+  if (copied_to_.size() > kCopiesRemembered) copied_to_.clear();
+  const std::string participant = participant_now(follower);
   for (const auto& [cell, description] : trainer_.cells()) {
     const std::vector<std::string> followers = followers_of(cell);
     if (std::find(followers.begin(), followers.end(), follower) == followers.end()) continue;
     for (const StoredBatch& record : store_.batches(cell).value_or(std::vector<StoredBatch>())) {
       if (stop.stop_requested()) return false;
       if (record.pruned || record.discarded) continue;
+      if (const auto said = copied_to_.find({participant, cell, record.id}); said != copied_to_.end()) {
+        has_all = has_all && said->second;
+        continue;
+      }
       const auto batch = store_.batch(cell, record.id);
       if (!batch) continue;
       const std::map<std::string, Error> wrong = send_copies({follower}, cell, record.id, batch->csv);
-      if (wrong.empty()) continue;
-      if (wrong.begin()->second.code == ErrorCode::kUnreachable) return false;
-      has_all = false;  // a batch that it refuses keeps none of the next ones from it
+      if (!wrong.empty() && wrong.begin()->second.code == ErrorCode::kUnreachable) return false;
+      copied_to_[{participant, cell, record.id}] = wrong.empty();
+      has_all = has_all && wrong.empty();  // a batch that it refuses keeps none of the next ones from it
     }
   }
   return has_all;

@@ -12,6 +12,7 @@
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -68,8 +69,8 @@ class ReplicaLink {
     std::string hash, text;
   };
 
-  ReplicaLink(wire::dds::Subscriber& subscriber, std::string server, const ReplicaOptions& options, Trainer& trainer,
-              Store& store, ReplicaListener listener);
+  ReplicaLink(wire::dds::Subscriber& subscriber, std::string server, std::string participant,
+              const ReplicaOptions& options, Trainer& trainer, Store& store, ReplicaListener listener);
   [[nodiscard]] Status open_endpoints(wire::dds::DomainParticipant& participant, wire::dds::Topic& snapshots);
   /// What was published before comes once more.
   [[nodiscard]] Status listen_to_snapshots();
@@ -99,6 +100,7 @@ class ReplicaLink {
   void forget_known_snapshots();
   /// Stores batches that the writer sent.
   void keep_copies();
+  void look_for_namesakes();
   void look_for_divergence(const std::vector<OtherReplica>& others, const ReplicaView& view);
   void publish(const ReplicaView& view);
   void tell_troubles();
@@ -113,9 +115,11 @@ class ReplicaLink {
                                                          const std::string& cell, const std::string& batch_id,
                                                          const std::string& csv);
   [[nodiscard]] std::vector<std::string> followers_of(const std::string& cell) const;
+  /// Empty: it is not there.
+  [[nodiscard]] std::string participant_now(const std::string& server) const;
 
   wire::dds::Subscriber& subscriber_;
-  const std::string server_;
+  const std::string server_, participant_;
   Trainer& trainer_;
   Store& store_;
   const ReplicaListener listener_;
@@ -133,12 +137,17 @@ class ReplicaLink {
   std::map<std::string, Heard> heard_ TRAMMEL_GUARDED_BY(mutex_);                                 // by server
   std::map<std::pair<std::string, std::string>, Snapshot> snapshots_ TRAMMEL_GUARDED_BY(mutex_);  // by server and cell
   std::deque<wire::BatchCopy> arrived_ TRAMMEL_GUARDED_BY(mutex_);
+  std::set<std::string> namesakes_ TRAMMEL_GUARDED_BY(mutex_);              // participants of servers of the same name
   std::set<std::string> behind_ TRAMMEL_GUARDED_BY(mutex_);                 // followers that may lack batches
   std::map<std::string, std::string> troubles_ TRAMMEL_GUARDED_BY(mutex_);  // by kind
   ReplicaRole role_ TRAMMEL_GUARDED_BY(mutex_);
   ReplicaRecord record_ TRAMMEL_GUARDED_BY(mutex_);  // as it is stored
   bool may_change_ TRAMMEL_GUARDED_BY(mutex_) = false;
   std::optional<ReplicaOptions> new_options_ TRAMMEL_GUARDED_BY(mutex_);
+
+  // Of the thread of the copies: what participants have said of batches, by participant, cell and batch. True: they
+  // have it. Whoever comes back after a cut is not sent all of them again.
+  std::map<std::tuple<std::string, std::string, std::string>, bool> copied_to_;
 
   // Of the thread of the replicas.
   bool begun_ = false;
