@@ -369,6 +369,7 @@ int main(int argc, char** argv) {
       "an address that this host does not have; 3 a file, the store or the port is refused; 70 the process hung and\n"
       "ended itself (start it again: deploy/supervise does). Each problem is a line of its own on standard error.");
   trammel::Arguments arguments;
+  app.set_version_flag("--version", trammel::DdsOptions().program_version);
   app.add_option("--config", arguments.config, "Server file (YAML); config/server.yaml has every key with its default")
       ->required();
   app.add_flag("--check", arguments.check,

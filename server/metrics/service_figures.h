@@ -29,7 +29,7 @@ struct ReplicaFigures {
   bool writes = false;                ///< it changes what is in force
   std::uint64_t epoch = 0;            ///< of the last decision that it knows
   std::size_t others = 0;             ///< that are there
-  std::vector<std::string> troubles;  ///< their kinds: `role`, `follow`, `divergence`, `batches`
+  std::vector<std::string> troubles;  ///< their kinds, as `trammel_replica_trouble` has them
 };
 
 /// Counts are since the service started.

@@ -92,7 +92,9 @@ std::string papers_table(const CompensatedModel& model, const std::optional<Posi
   add("tool", tools(model.parts()));
   add("instrument", fmt::format("{}; {:.4g} mm (1 sigma, per axis) as stated", or_not_told(papers.instrument), sigma));
   add("operator", or_not_told(papers.operator_name));
-  add("measured", made.measured_at ? shown_day(*made.measured_at) : "not recorded");
+  // A batch that says no time has the date of its file, which the model does not tell from a time.
+  add("measured", made.measured_at ? shown_day(*made.measured_at) + " (by time_s, else the date of the file)"
+                                   : std::string("not recorded"));
   add("model", fmt::format("{}, trained {} on {} poses of {}", made.id, shown_day(made.trained_at), made.training_poses,
                            made.batch_id));
   if (accuracy) add("this volume", volume(*accuracy));
@@ -173,8 +175,9 @@ std::string rounded_up_mm(double length) {
 
 std::string promise_sentence(const CompensatedModel& model, const std::optional<PositionAccuracy>& accuracy) {
   if (!accuracy) return "How good this model is cannot be said: it knows no pose that this cell can ask for.";
-  return fmt::format("Good to {} mm at 95 % in this volume; not known beyond; {}.",
-                     rounded_up_mm(accuracy->at(PositionAccuracy::kShare)), check_by(model.provenance()));
+  return fmt::format("Good to {} mm at 95 % in this volume{}; not known beyond; {}.",
+                     rounded_up_mm(accuracy->at(PositionAccuracy::kShare)),
+                     accuracy->judged_by() > 0 ? "" : ", by its training poses alone", check_by(model.provenance()));
 }
 
 std::string certificate(const CompensatedModel& model, const std::optional<PositionAccuracy>& accuracy,

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 namespace trammel {
 namespace {
 
@@ -58,6 +60,14 @@ TEST(ReplicaRole, AnUnchangedFileDecidesNothingWhileAnotherOneWrites) {
   const ReplicaRecord record{ReplicaRole::kPromotion, false, "b", "writer"};
   EXPECT_FALSE(role.told(record, writer(), {writes("b", ReplicaRole::kPromotion)}).record.writes);
   EXPECT_TRUE(role.told(record, writer(), {follows("c", "b", ReplicaRole::kPromotion)}).record.writes);
+}
+
+TEST(ReplicaRole, AnEpochThatSomebodyMadeUpLeavesTheNextOneNewerThanAllOthers) {
+  ReplicaRole role("a", follower(), kStart);
+  const std::vector<OtherReplica> others = {follows("c", "b", std::numeric_limits<std::uint64_t>::max())};
+  const RoleDecision told = role.told({17, false, "b", "follower of b"}, writer(), others);
+  EXPECT_TRUE(told.record.writes);
+  EXPECT_GT(told.record.epoch, std::numeric_limits<std::uint64_t>::max() / 2);
 }
 
 TEST(ReplicaRole, OfTwoThatWriteTheOneWithTheLowerEpochStopsAndBothSaySo) {

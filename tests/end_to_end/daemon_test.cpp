@@ -262,6 +262,15 @@ TEST(DaemonCommandLine, ExitsWith2OnWrongUsage) {
   EXPECT_EQ(test::run({test::trammeld_path(), "--config", "x", "--bogus"}).exit_code, 2);
   EXPECT_EQ(test::run({test::trammeld_path(), "--config", "x", "--port", "80"}).exit_code, 2);
   EXPECT_EQ(test::run({test::trammeld_path(), "--help"}).exit_code, 0);
+  const auto without_a_file = test::run({test::trammeld_path(), "--check"});
+  EXPECT_EQ(without_a_file.err.find("trammeld: --config is required"), 0u) << without_a_file.err;
+  EXPECT_NE(without_a_file.err.find("trammeld --help"), std::string::npos) << without_a_file.err;
+}
+
+TEST(DaemonCommandLine, HasTheVersionOfTheCommandLine) {
+  const auto daemon = test::run({test::trammeld_path(), "--version"});
+  EXPECT_EQ(daemon.exit_code, 0) << daemon.err;
+  EXPECT_EQ(daemon.out, test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "--version"}).out);
 }
 
 TEST(DaemonCommandLine, ExitsWith3OnARefusedServerFileAndNamesIt) {

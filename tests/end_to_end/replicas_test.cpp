@@ -277,7 +277,7 @@ TEST_F(ReplicasTest, APromotedFollowerWritesAndTheOldWriterComesBackAsItsFollowe
     EXPECT_NE(kept.out.find(batch), std::string::npos) << batch << " is written over: " << kept.out;
 }
 
-TEST_F(ReplicasTest, TwoWritersAreSaidOneOfThemStopsAndNothingIsLost) {
+TEST_F(ReplicasTest, OfTwoWritersOneStopsAndSaysSoAndNothingIsLost) {
   give(0, "role: writer");
   give(1, "role: writer");
   first_.start();
@@ -289,7 +289,6 @@ TEST_F(ReplicasTest, TwoWritersAreSaidOneOfThemStopsAndNothingIsLost) {
   learn("lt-1", 1);
   second_.start();  // has decided nothing yet: its epoch is the lower one
   ASSERT_TRUE(second_.process().wait_for_line("two servers write", kLimit)) << second_.process().standard_error();
-  ASSERT_TRUE(first_.process().wait_for_line("two servers write", kLimit)) << first_.process().standard_error();
   EXPECT_TRUE(wait_until([](const ServerStatus& a, const ServerStatus& b) {
     return same(a, b) && a.replica->writes && !b.replica->writes && a.replica->cells.at(0).version == 1;
   }));

@@ -164,11 +164,19 @@ TEST_F(ModelPage, BeginsWithHowGoodItIsWhereAndUntilWhen) {
   const CompensatedModel model = trained_on(cell_with(""), batch_);
   const auto accuracy = PositionAccuracy::of(model);
   const std::string promise = promise_sentence(model, accuracy);
-  EXPECT_EQ(promise, fmt::format("Good to {} mm at 95 % in this volume; not known beyond; check again by 2025-12-24.",
+  EXPECT_EQ(promise, fmt::format("Good to {} mm at 95 % in this volume, by its training poses alone; not known beyond; "
+                                 "check again by 2025-12-24.",
                                  rounded_up_mm(accuracy->at(0.95))));
   const std::string page = model_page(model, std::nullopt);
   EXPECT_TRUE(has(page, "<p id=\"promise\">" + promise));
   EXPECT_LT(page.find(promise), page.find("<table"));
+}
+
+TEST_F(ModelPage, SaysFirstWhereNoPoseHasTestedIt) {
+  const CompensatedModel model = trained("none");
+  EXPECT_TRUE(has(promise_sentence(model, PositionAccuracy::of(model)), " volume, by its training poses alone; not"));
+  const auto tested = PositionAccuracy::of(model, check_against_cell(batch_, *cell_)->rows());
+  EXPECT_TRUE(has(promise_sentence(model, tested), " volume; not known beyond"));
 }
 
 TEST_F(ModelPage, SaysThatTheDayOfTheNextCheckHasPassedWhereItHas) {

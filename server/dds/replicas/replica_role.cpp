@@ -1,6 +1,7 @@
 #include "server/dds/replicas/replica_role.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace trammel {
@@ -31,7 +32,10 @@ std::string ReplicaRole::part() const {
 ReplicaRecord ReplicaRole::promoted(const ReplicaRecord& record, const std::vector<OtherReplica>& others) const {
   std::uint64_t newest = record.epoch;
   for (const OtherReplica& other : others) newest = std::max(newest, other.epoch);
-  return {(newest / kPromotion + 1) * kPromotion, true, "", part()};
+  // No epoch is newer than the last one, whatever somebody claims.
+  const std::uint64_t promotions =
+      std::min(newest / kPromotion + 1, std::numeric_limits<std::uint64_t>::max() / kPromotion);
+  return {promotions * kPromotion, true, "", part()};
 }
 
 RoleDecision ReplicaRole::begin(const std::optional<ReplicaRecord>& remembered) const {
