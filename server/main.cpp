@@ -1,5 +1,6 @@
 // trammeld: creates the parts of the server, connects and runs them, and stops them in reverse order.
 #include <signal.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -389,6 +390,7 @@ int main(int argc, char** argv) {
                trammel::shown(error.what()));
     return trammel::kExitUsage;
   }
+  ::umask(0077);  // measurements, models and records are for the daemon's user only
   trammel::ignore_what_calls_report();
   trammel::give_large_blocks_back();
   return trammel::run(arguments);

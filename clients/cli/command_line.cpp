@@ -6,6 +6,7 @@
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/terminal/command_tree.h"
 #include "clients/cli/terminal/defaults.h"
+#include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/terminal/spared_inputs.h"
 #include "clients/cli/terminal/usage.h"
@@ -102,6 +103,7 @@ void make_command_line(CLI::App& app, Action& chosen) {
     command->footer((examples.empty() ? "" : "Examples:\n" + examples + "\n\n") + std::string(common_footer()));
   }
   set_help_format(app);
+  need_finite_numbers(app);
 }
 
 int run_command_line(int argc, const char* const* argv) {

@@ -35,6 +35,14 @@ using library::to_api;
 namespace {
 
 constexpr std::size_t kPosesTogether = 256;  // poses that a model predicts at once
+constexpr double kLargestShare = 0.9;        // of the rows that may be held out
+
+trammel::Status check_share(double share) {
+  if (share >= 0 && share <= kLargestShare) return {};
+  return failure(trammel::ErrorCode::kUsage, "validation_share is {}, limits 0 and {}", share, kLargestShare)
+      .of("validation_share")
+      .beyond(share, kLargestShare);
+}
 
 /// Batches made ready for a cell, each a session of its own or as many as its column says. Two of one name get numbers.
 trammel::Result<CheckedBatch> checked(std::span<const Batch> batches, const trammel::Cell& cell,
@@ -189,6 +197,12 @@ Result<Cell> Cell::load(const std::string& path) {
 std::string Cell::name() const { return inside_->cell->name; }
 std::string Cell::robot() const { return inside_->cell->robot.name(); }
 std::size_t Cell::joints() const { return static_cast<std::size_t>(inside_->cell->robot.size()); }
+std::vector<std::string> Cell::joint_columns() const {
+  std::vector<std::string> names;
+  for (const JointType type : joint_types(inside_->cell->robot))
+    names.push_back(joint_column(static_cast<int>(names.size()), type));
+  return names;
+}
 std::vector<std::string> Cell::tools() const {
   std::vector<std::string> ids;
   for (const auto& [id, tool] : inside_->cell->tools) ids.push_back(id);
@@ -213,6 +227,7 @@ Result<Batch> Batch::parse(const std::string& csv, const std::string& name) {
 }
 std::string Batch::name() const { return inside_->rows.id; }
 std::size_t Batch::size() const { return inside_->rows.measurements.size(); }
+std::string Batch::table() const { return to_csv(inside_->rows); }
 std::string Batch::csv() const {
   const MeasurementBatch& rows = inside_->rows;
   return rows.source_text.empty() ? to_csv(rows) : rows.source_text;
@@ -320,6 +335,7 @@ Result<Evaluation> Model::evaluate(std::span<const Batch> batches) const {
 Result<Model> train(const Cell& cell, std::span<const Batch> batches, const TrainOptions& options) {
   const auto fits = trainable(cell, {.error_sources = !options.level, .bias = !options.bias});
   if (!fits) return passed_on(fits);
+  if (const auto fits_too = check_share(options.validation_share); !fits_too) return passed_on(fits_too);
   const auto batch = checked(batches, *cell.inside().cell, drawn(options.validation_share, options.seed));
   if (!batch) return passed_on(batch);
   trammel::TrainOptions how;

@@ -1,5 +1,6 @@
 #include "clients/library/trammel/service.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -33,6 +34,8 @@ struct Session::Inside {
 };
 
 namespace {
+
+constexpr std::chrono::milliseconds kLongestTimeout = std::chrono::hours(24);
 
 client::CallContext context_of(const Asked& asked) {
   return {asked.cell, asked.context.tool, asked.context.payload, asked.controller_compensates, {}};
@@ -135,7 +138,7 @@ Result<Session> Session::open(const SessionOptions& options) {
   client::SessionOptions how;
   how.domain = options.domain;
   how.server_ports = options.ports;
-  how.timeout = options.timeout;
+  how.timeout = std::min(options.timeout, kLongestTimeout);
   auto session = client::Session::open(how);
   if (!session) return passed_on(session);
   auto inside = std::make_unique<Inside>();

@@ -291,6 +291,7 @@ void add_files(py::module_& m) {
       .def("name", &api::Cell::name)
       .def("robot", &api::Cell::robot)
       .def("joints", &api::Cell::joints)
+      .def("joint_columns", &api::Cell::joint_columns)
       .def("tools", &api::Cell::tools)
       .def("payloads", &api::Cell::payloads);
   py::class_<api::Batch>(m, "Batch")
@@ -306,7 +307,8 @@ void add_files(py::module_& m) {
           "csv"_a, "name"_a)
       .def("name", &api::Batch::name)
       .def("size", &api::Batch::size)
-      .def("csv", &api::Batch::csv);
+      .def("csv", &api::Batch::csv)
+      .def("table", &api::Batch::table);
 }
 
 py::list parameters_of(const api::Model& model) {
@@ -460,6 +462,8 @@ void add_session_work(py::class_<Session>& session) {
             const api::Asked asked{
                 cell, context_of(std::move(tool), std::move(payload), std::move(directions), temperature_c), false};
             const auto answer = value_or_raise(unlocked([&] { return s.predict(asked, joints); }));
+            if (answer.items.size() != static_cast<std::size_t>(joints_deg.ndim() == 2 ? joints_deg.shape(0) : 1))
+              refuse("joints_deg", "an array of shape (N, n) is needed, n the robot's joints");
             return py::make_tuple(to_python(answer.model), to_python(answer.items));
           },
           "cell"_a, "joints_deg"_a, "tool"_a, "payload"_a, "directions"_a, "temperature_c"_a)

@@ -22,6 +22,7 @@ namespace {
 /// Share of the timeout that one part of a long call should take. At half of the timeout a request is sent again; this
 /// is far below.
 constexpr double kShareOfTimeout = 0.1;
+constexpr std::uint32_t kHighestDomain = 232;  // of ports that are numbers of UDP
 constexpr std::chrono::milliseconds kJobPoll{2000};
 constexpr std::size_t kHomesRemembered = 1000;  // of a session's jobs
 constexpr std::chrono::milliseconds kLook{50};  // between two looks at what servers say
@@ -86,6 +87,10 @@ Result<SessionOptions> completed(SessionOptions options) {
 }
 
 Result<wire::ParticipantPtr> participant_of(const SessionOptions& options) {
+  if (options.domain > kHighestDomain)
+    return failure(ErrorCode::kUsage, "domain is {}, limit {}", options.domain, kHighestDomain)
+        .of("domain")
+        .beyond(options.domain, kHighestDomain);
   wire::ParticipantOptions how;
   how.name = "trammel client";
   how.domain = options.domain;

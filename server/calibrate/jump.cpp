@@ -28,8 +28,10 @@ constexpr double kBeforeSlow = 13.8;                 // twice the log likelihood
 constexpr std::size_t kMostDerivatives = 2'000'000;  // poses times parameters: 100 MB of equations
 constexpr std::size_t kFewestPoses = 40;             // to look at
 constexpr std::size_t kFewestBeyond = 6;             // poses before a jump, and from it on
-constexpr double kLeastSeen = 1;   // information of a candidate, prior units: below it the poses do not show it
-constexpr double kWholeBatch = 1;  // of its length: lags of what grows slowly
+constexpr double kLeastSeen = 1;       // information of a candidate, prior units: below it the poses do not show it
+constexpr double kUsuallyLeft = 1e-3;  // m, of a model: where it leaves more, what jumped may be as much larger
+constexpr double kLittle = 1e-3;       // of the poses' information: a prior that hardly shrinks a size
+constexpr double kWholeBatch = 1;      // of its length: lags of what grows slowly
 constexpr double kLags[] = {0.05, 0.1, 0.2, 0.4, kWholeBatch};
 constexpr Index kWaves = 16;              // half waves over the batch, of which a wandering course is made
 constexpr double kRoughness[] = {1, 2};   // power of the wave number that its amplitudes fall by: a walk, and smoother
@@ -68,12 +70,13 @@ class JumpSearch {
       : kinds_(found.model, ChangesOf::kArmAndInstrument),
         s_(scaled_parameters(kinds_.probe(), {})),
         own_(kinds_.own()),
-        changes_(kinds_.changes()) {
+        changes_(kinds_.changes()),
+        prior_(std::pow(std::max(1.0, found.discrepancy / kUsuallyLeft), -2)) {
     const Weights weights{found.discrepancy, found.discrepancy_rotation, true};
     for (const Measurement* m : poses) add(*m, weights);
     free_sides();
     const Index P = poses_.empty() ? 0 : poses_.front().free.rows();
-    MatrixXd information = MatrixXd::Identity(P, P);
+    MatrixXd information = prior_ * MatrixXd::Identity(P, P);
     for (const PoseEquations& pose : poses_) information.noalias() += pose.free * pose.free.transpose();
     factor_.compute(information);
     settle();
@@ -181,11 +184,12 @@ class JumpSearch {
     }
   }
 
-  [[nodiscard]] Fitted fit(Index first, Index count, const KindSums& sums) const {
+  /// `most_prior`: of the information, at most so much is the prior's.
+  [[nodiscard]] Fitted fit(Index first, Index count, const KindSums& sums, double most_prior = 1e12) const {
     const MatrixXd shared = sums.shared.middleRows(first, count);
     MatrixXd left = sums.own.block(first, first, count, count) - shared * factor_.solve(shared.transpose());
-    if (left.trace() < kLeastSeen) return {};
-    left.diagonal().array() += 1;  // the prior
+    if (left.trace() < kLeastSeen * prior_) return {};
+    left.diagonal().array() += std::min(prior_, most_prior * left.trace() / static_cast<double>(count));
     const VectorXd along = sums.along.segment(first, count) - shared * at_rest_;
     const VectorXd size = left.ldlt().solve(along);
     return {along.dot(size), size};
@@ -301,9 +305,12 @@ class JumpSearch {
   [[nodiscard]] Jump told(const Scored& best, double chance, const std::vector<Scored>& all) const {
     const Measurement& begins = *poses_[best.at].measurement;
     Jump jump{best.kind->from(begins.context.index), begins.pose_id, begins.row, 0, chance, {}};
+    KindSums since(kinds(), unknowns());
+    for (std::size_t i = best.at; i < poses_.size(); ++i) since.add(poses_[i]);
+    const VectorXd size = fit(best.kind->first, best.kind->count, since, kLittle).size;
     double square = 0;
     for (std::size_t i = best.at; i < poses_.size(); ++i) {
-      const VectorXd moved = poses_[i].kinds.middleRows(best.kind->first, best.kind->count).transpose() * best.size;
+      const VectorXd moved = poses_[i].kinds.middleRows(best.kind->first, best.kind->count).transpose() * size;
       square += moved.head<3>().squaredNorm() / std::pow(poses_[i].inverse_sigma, 2);
     }
     jump.effect = std::sqrt(square / static_cast<double>(poses_.size() - best.at));
@@ -319,6 +326,7 @@ class JumpSearch {
   const ChangeKinds kinds_;
   const ScaledParameters s_;
   const std::vector<Index> own_, changes_;
+  const double prior_;  // information of a prior, 1 where the model leaves no more than usual
   std::vector<PoseEquations> poses_;
   Eigen::LLT<MatrixXd> factor_;
   VectorXd at_rest_;  // P: by how much what is free still moves

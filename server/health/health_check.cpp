@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <limits>
 #include <numeric>
 
 #include "server/base/units.h"
@@ -29,13 +30,15 @@ using health::Hypothesis;
 using health::RefittedRows;
 using health::Sifted;
 
-constexpr int kMostCauses = 3;       // that a check may name
-constexpr double kAlike = 6;         // of scores: odds of e^3
-constexpr double kCredible = 0.99;   // of all single causes' odds: those that could be it have it together
-constexpr double kUnlinear = 0.003;  // of an effect
-constexpr double kDoubtful = 0.02;   // chance from which on nothing is said for certain
-constexpr double kNearlySeen = 10;   // times the limit: a cause that is named where the whole is beyond chance
-constexpr double kFarOff = 5e-3;     // m rms, base refitted: no small change, and effects are no longer linear
+constexpr int kMostCauses = 3;        // that a check may name
+constexpr int kRounds = 3;            // of looking at each of them again beside the others
+constexpr double kAlike = 6;          // of scores: odds of e^3
+constexpr double kCredible = 0.99;    // of all single causes' odds: those that could be it have it together
+constexpr double kUnlinear = 0.003;   // of an effect
+constexpr double kDoubtful = 0.02;    // chance from which on nothing is said for certain
+constexpr double kNearlySeen = 10;    // times the limit: a cause that is named where the whole is beyond chance
+constexpr double kExtrapolated = 10;  // times what the poses are off by: an effect that large is not seen in them
+constexpr double kFarOff = 5e-3;      // m rms, base refitted: no small change, and effects are no longer linear
 
 Eigen::MatrixXd joined(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other) {
   Eigen::MatrixXd both(one.rows(), one.cols() + other.cols());
@@ -54,6 +57,11 @@ std::string date_of(std::int64_t unix_s) {
   gmtime_r(&time, &utc);
   return fmt::format("{:04}-{:02}-{:02}", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday);
 }
+
+/// How large an effect is over the working poses, and U(k=2).
+struct Size {
+  double rms = 0, u95 = 0;
+};
 
 /// One check, while it is looked through.
 class Examination {
@@ -86,6 +94,12 @@ class Examination {
   }
 
  private:
+  /// A cause that was found, and the chance of as much in a healthy check.
+  struct Named {
+    std::size_t hypothesis = 0;
+    double chance = 1;
+  };
+
   [[nodiscard]] health::Questions questions() const {
     health::Questions questions{health::cause_hypotheses(effects_, rows_, signals_), 0};
     questions.causes = questions.hypotheses.size();
@@ -104,7 +118,17 @@ class Examination {
   [[nodiscard]] bool is_tool(std::size_t hypothesis) const;
   /// Whether a cause was found, and the rest is to be looked at again.
   bool look_once(const CheckTests& tests);
-  void found(std::size_t hypothesis, const CheckTests& tests, double chance, const std::vector<double>& scores);
+  /// Each cause once more beside the others: one that they make needless goes, one that now fits better comes.
+  void look_back();
+  /// The cause that explains most for its price; empty: none explains anything.
+  [[nodiscard]] std::optional<std::size_t> likeliest(const CheckTests& tests, const Eigen::VectorXd& left) const;
+  /// Refitted besides: all that were named but the one at `k`.
+  [[nodiscard]] CheckTests beside_others(std::size_t k) const;
+  void refit_named();
+  [[nodiscard]] Size size(std::size_t hypothesis, const RefittedRows& refitted, Eigen::VectorXd* theta) const;
+  /// Whether it would do far more elsewhere than these poses are off by: they do not show it.
+  [[nodiscard]] bool is_extrapolated(std::size_t hypothesis, const RefittedRows& refitted) const;
+  void tell_change(const Named& named, const CheckTests& tests);
   void tell_rivals(std::size_t hypothesis, const CheckTests& tests, const std::vector<double>& scores,
                    SeenChange& change) const;
   [[nodiscard]] std::vector<bool> credible(const std::vector<double>& scores) const;
@@ -127,15 +151,13 @@ class Examination {
   HealthyChecks healthy_;
   Sifted sifted_;
   Eigen::MatrixXd covariance_;  // with what a change that was found may leave over
-  Eigen::MatrixXd nuisance_;    // refitted: frames, bad poses, changes that were found
-  bool is_far_ = false;         // only a tool that sits elsewhere is named
-  bool is_too_far_ = false;     // nothing is
+  Eigen::MatrixXd always_;      // refitted: frames and bad poses
+  Eigen::MatrixXd nuisance_;    // the same and changes that were found
+  std::vector<Named> named_;
+  double off_ = 0;           // m rms of the positions
+  bool is_far_ = false;      // only a tool that sits elsewhere is named
+  bool is_too_far_ = false;  // nothing is
   HealthCheck check_;
-};
-
-/// How large an effect is over the working poses, and U(k=2).
-struct Size {
-  double rms = 0, u95 = 0;
 };
 
 /// Of columns with `own` (R x k, whitened, refitted), fitted to `left`.
@@ -164,14 +186,19 @@ Size size_of_any(const Eigen::MatrixXd& own, const Eigen::VectorXd& left, double
 }
 
 void Examination::look_for_changes(const CheckTests& healthy) {
-  nuisance_ = frames();
+  always_ = frames();
   for (const int pose : sifted_.bad)
-    nuisance_ = joined(nuisance_, questions_.hypotheses[questions_.causes + static_cast<std::size_t>(pose)].columns);
-  is_far_ = distance_of(healthy.rows()) > kFarOff;
-  if (!look_once(healthy) || is_far_) return;
-  while (static_cast<int>(check_.changed.size()) < kMostCauses &&
-         look_once(CheckTests(covariance_, nuisance_, questions_))) {
+    always_ = joined(always_, questions_.hypotheses[questions_.causes + static_cast<std::size_t>(pose)].columns);
+  nuisance_ = always_;
+  off_ = distance_of(healthy.rows());
+  is_far_ = off_ > kFarOff;
+  if (look_once(healthy) && !is_far_) {
+    while (static_cast<int>(named_.size()) < kMostCauses && look_once(CheckTests(covariance_, nuisance_, questions_))) {
+    }
+    look_back();
   }
+  for (std::size_t k = 0; k < named_.size(); ++k)
+    tell_change(named_[k], named_.size() == 1 ? healthy : beside_others(k));
 }
 
 bool Examination::look_once(const CheckTests& tests) {
@@ -180,20 +207,73 @@ bool Examination::look_once(const CheckTests& tests) {
   const double limit = healthy_.limit(options_.false_alarm);
   if (smallest >= limit) return false;
   const double chance = healthy_.chance_of(smallest);
-  const std::vector<double> scores = tests.scores(left);
-  const auto causes_end = scores.begin() + static_cast<std::ptrdiff_t>(questions_.causes);
-  const auto best = static_cast<std::size_t>(std::max_element(scores.begin(), causes_end) - scores.begin());
-  if (is_far_ && !(questions_.causes > 0 && is_tool(best))) {
+  const std::optional<std::size_t> best = likeliest(tests, left);
+  if (is_far_ && !(best && is_tool(*best))) {
     is_too_far_ = true;
     return false;
   }
-  const bool fits = questions_.causes > 0 && scores[best] > 0 && tests.p_value(best, left) < kNearlySeen * limit;
+  const bool fits = best && tests.p_value(*best, left) < kNearlySeen * limit;
   if (fits) {
-    found(best, tests, chance, scores);
-  } else if (check_.changed.empty() && tests.whole_p(left) < limit) {
+    named_.push_back({*best, chance});
+    refit_named();
+  } else if (named_.empty() && tests.whole_p(left) < limit) {
     unknown_found(chance, left, tests.rows().freedom());
   }
   return fits;
+}
+
+std::optional<std::size_t> Examination::likeliest(const CheckTests& tests, const Eigen::VectorXd& left) const {
+  std::vector<double> scores = tests.scores(left);
+  scores.resize(questions_.causes);
+  while (!scores.empty()) {
+    const auto best = std::max_element(scores.begin(), scores.end());
+    const auto hypothesis = static_cast<std::size_t>(best - scores.begin());
+    if (*best <= 0) return std::nullopt;
+    if (!is_extrapolated(hypothesis, tests.rows())) return hypothesis;
+    *best = 0;
+  }
+  return std::nullopt;
+}
+
+CheckTests Examination::beside_others(std::size_t k) const {
+  Eigen::MatrixXd refitted = always_;
+  for (std::size_t other = 0; other < named_.size(); ++other)
+    if (other != k) refitted = joined(refitted, questions_.hypotheses[named_[other].hypothesis].columns);
+  return CheckTests(covariance_, refitted, questions_);
+}
+
+void Examination::refit_named() {
+  covariance_ = rows_.covariance;
+  nuisance_ = always_;
+  for (std::size_t k = 0; k < named_.size(); ++k) {
+    const Eigen::MatrixXd& columns = questions_.hypotheses[named_[k].hypothesis].columns;
+    Eigen::VectorXd theta;
+    static_cast<void>(size(named_[k].hypothesis, RefittedRows(rows_.covariance, nuisance_), &theta));
+    covariance_.diagonal() += (kUnlinear * columns * theta).cwiseAbs2();
+    nuisance_ = joined(nuisance_, columns);
+  }
+}
+
+void Examination::look_back() {
+  const double limit = healthy_.limit(options_.false_alarm);
+  bool settled = false;
+  for (int round = 0; round < kRounds && !settled; ++round) {
+    settled = true;
+    for (std::size_t k = 0; k < named_.size() && named_.size() > 1; ++k) {
+      const CheckTests tests = beside_others(k);
+      const Eigen::VectorXd left = tests.rows().left(rows_.residual);
+      const double smallest = tests.smallest_p(left);
+      const std::optional<std::size_t> best = likeliest(tests, left);
+      if (smallest < limit && best == named_[k].hypothesis) continue;
+      settled = false;
+      if (smallest < limit && best) {
+        named_[k] = {*best, healthy_.chance_of(smallest)};
+      } else {
+        named_.erase(named_.begin() + static_cast<std::ptrdiff_t>(k--));
+      }
+      refit_named();
+    }
+  }
 }
 
 double Examination::distance_of(const RefittedRows& refitted) const {
@@ -207,22 +287,27 @@ bool Examination::is_tool(std::size_t hypothesis) const {
   return effects_.causes()[questions_.hypotheses[hypothesis].cause].columns == effects_.tool_columns();
 }
 
-void Examination::found(std::size_t hypothesis, const CheckTests& tests, double chance,
-                        const std::vector<double>& scores) {
-  const RefittedRows& refitted = tests.rows();
+Size Examination::size(std::size_t hypothesis, const RefittedRows& refitted, Eigen::VectorXd* theta) const {
   const Hypothesis& one = questions_.hypotheses[hypothesis];
   const CauseEffects::Entry& entry = effects_.causes()[one.cause];
   const Eigen::VectorXd left = refitted.left(rows_.residual);
   const Eigen::MatrixXd own = refitted.left(one.columns);
+  return entry.cause.any_function ? size_of_any(own, left, working_.any_function_rms(entry.columns.front()), theta)
+                                  : size_of(own, left, working_.left_square(entry.columns), theta);
+}
+
+bool Examination::is_extrapolated(std::size_t hypothesis, const RefittedRows& refitted) const {
   Eigen::VectorXd theta;
-  const Size size = entry.cause.any_function
-                        ? size_of_any(own, left, working_.any_function_rms(entry.columns.front()), &theta)
-                        : size_of(own, left, working_.left_square(entry.columns), &theta);
-  SeenChange change{entry.cause, size.rms, size.u95, chance, {}};
-  tell_rivals(hypothesis, tests, scores, change);
+  return size(hypothesis, refitted, &theta).rms > kExtrapolated * off_;
+}
+
+void Examination::tell_change(const Named& named, const CheckTests& tests) {
+  Eigen::VectorXd theta;
+  const Size sized = size(named.hypothesis, tests.rows(), &theta);
+  const CauseEffects::Entry& entry = effects_.causes()[questions_.hypotheses[named.hypothesis].cause];
+  SeenChange change{entry.cause, sized.rms, sized.u95, named.chance, {}};
+  tell_rivals(named.hypothesis, tests, tests.scores(tests.rows().left(rows_.residual)), change);
   check_.changed.push_back(std::move(change));
-  covariance_.diagonal() += (kUnlinear * one.columns * theta).cwiseAbs2();
-  nuisance_ = joined(nuisance_, one.columns);
 }
 
 /// The most likely single causes that together have kCredible of the odds: many that are each unlikely may hold the

@@ -54,6 +54,7 @@ struct CellHistory {
   std::vector<VersionOnRecord> versions = {};
   std::vector<TrainingOnRecord> trainings = {};
   std::vector<EventOnRecord> events = {};
+  bool of_files = false;  ///< model files, which do not say what is in force
 };
 
 /// A parameter of the arm that moved by more than both uncertainties between two versions of which the later one was

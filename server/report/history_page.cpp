@@ -94,10 +94,30 @@ bool has_moved(const std::vector<Moved>& moved, const ParameterOnRecord& one) {
                      [&](const Moved& m) { return m.cause == one.cause && m.parameter == one.name; });
 }
 
+std::string value_in(const Track& track, int version, const Reading& reading) {
+  const auto found = track.find(version);
+  if (found == track.end()) return "not in it";
+  const ShownValue value = show_read(found->second->value, found->second->u95, reading);
+  return fmt::format("{} ± {}", value.value, value.expanded);
+}
+
+/// What is in force; of files, or where that has no parameters on record, the newest that has; nullptr: none has.
+const VersionOnRecord* shown_version(const CellHistory& history) {
+  const VersionOnRecord* newest = nullptr;
+  for (const VersionOnRecord& one : history.versions) {
+    if (one.parameters.empty()) continue;
+    if (one.in_force) return &one;
+    newest = &one;
+  }
+  return newest;
+}
+
 std::string parameter_table(const CellHistory& history, const std::vector<Moved>& moved) {
   std::vector<int> versions;
   for (const VersionOnRecord& one : history.versions)
     if (!one.parameters.empty()) versions.push_back(one.version);
+  const VersionOnRecord* shown = shown_version(history);
+  if (shown == nullptr) return "<p>No version has any.</p>";
   std::vector<HtmlRow> rows;
   std::string cause;
   for (const Tracked& one : tracked(history)) {
@@ -106,18 +126,16 @@ std::string parameter_table(const CellHistory& history, const std::vector<Moved>
     cause = last.cause;
     const Reading reading = reading_of(last.unit);
     const ShownValue first = show_read(one.first->value, one.first->u95, reading);
-    const ShownValue now = show_read(last.value, last.u95, reading);
     const bool marked = has_moved(moved, last);
     rows.push_back(
         {{html_text(last.name), fmt::format("{} ± {}", first.value, first.expanded),
-          fmt::format("{} ± {}", now.value, now.expanded), html_text(reading.unit), track_svg(one.track, versions)},
+          value_in(one.track, shown->version, reading), html_text(reading.unit), track_svg(one.track, versions)},
          marked            ? "moved"
          : last.identified ? ""
                            : "unknown"});
   }
-  if (rows.empty()) return "<p>No version has any.</p>";
-  return html_table(
-      {"parameters flows", {"parameter", "first", "now", "unit", "over the versions, ± U (k = 2)"}, rows});
+  const std::string now = fmt::format("version {}{}", shown->version, shown->in_force ? " (in force)" : "");
+  return html_table({"parameters flows", {"parameter", "first", now, "unit", "over the versions, ± U (k = 2)"}, rows});
 }
 
 std::string version_table(const CellHistory& history) {
@@ -156,14 +174,17 @@ std::string event_table(const CellHistory& history) {
   return html_table({"events stacks", {"when (UTC)", "what", "of what", "why", "who"}, rows});
 }
 
+std::string in_force_sentence(const CellHistory& history) {
+  for (const VersionOnRecord& one : history.versions)
+    if (one.in_force) return fmt::format("Version {} is in force, trained on {}.", one.version, day_of(one.trained_at));
+  return history.of_files ? "Model files do not say which version is in force." : "No version in force is on record.";
+}
+
 std::string verdict(const CellHistory& history, const std::vector<Moved>& moved) {
-  const auto now = std::find_if(history.versions.begin(), history.versions.end(),
-                                [](const VersionOnRecord& one) { return one.in_force; });
-  std::string text = now == history.versions.end()
-                         ? "No version in force is on record."
-                         : fmt::format("Version {} is in force, trained on {}.", now->version, day_of(now->trained_at));
+  const VersionOnRecord* now = shown_version(history);
+  std::string text = in_force_sentence(history);
   std::string list;
-  if (now != history.versions.end())
+  if (now != nullptr)
     for (const std::string& note : now->notes) list += "<li>" + html_text(note) + "</li>";
   for (const Moved& one : moved) {
     const Reading reading = reading_of(one.unit);

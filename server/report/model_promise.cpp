@@ -16,6 +16,7 @@ namespace trammel {
 
 namespace {
 
+constexpr int kFewestToJudge = 10;  // fresh poses: with fewer the promise says by how many it was tested
 constexpr std::int64_t kDay = 86400;
 /// How long a model is taken for good where no check has told how fast its arm drifts, days.
 constexpr std::int64_t kFirstCheck = 30;
@@ -76,7 +77,8 @@ std::string tools(const ModelParts& parts) {
 std::string judged_by(const std::optional<PositionAccuracy>& accuracy) {
   if (!accuracy) return "nothing";
   return accuracy->judged_by() > 0
-             ? fmt::format("{} poses that were not trained on", accuracy->judged_by())
+             ? fmt::format("{} pose{} that {} not trained on", accuracy->judged_by(),
+                           accuracy->judged_by() == 1 ? "" : "s", accuracy->judged_by() == 1 ? "was" : "were")
              : "the scatter of its own training poses; none was held out, so it is believed, not tested";
 }
 
@@ -163,6 +165,13 @@ std::string tolerance_sentence(const PositionAccuracy& accuracy, const std::opti
                      to_mm(*of_cell), held(accuracy, *of_cell), rounded_up_mm(promised));
 }
 
+/// What the promise stands on, where that is little; it follows "in this volume".
+std::string hardly_judged(const PositionAccuracy& accuracy) {
+  if (accuracy.judged_by() >= kFewestToJudge) return "";
+  if (accuracy.judged_by() == 0) return ", by its training poses alone";
+  return fmt::format(", tested by {} fresh pose{} only", accuracy.judged_by(), accuracy.judged_by() == 1 ? "" : "s");
+}
+
 }  // namespace
 
 std::string rounded_up_mm(double length) {
@@ -176,8 +185,8 @@ std::string rounded_up_mm(double length) {
 std::string promise_sentence(const CompensatedModel& model, const std::optional<PositionAccuracy>& accuracy) {
   if (!accuracy) return "How good this model is cannot be said: it knows no pose that this cell can ask for.";
   return fmt::format("Good to {} mm at 95 % in this volume{}; not known beyond; {}.",
-                     rounded_up_mm(accuracy->at(PositionAccuracy::kShare)),
-                     accuracy->judged_by() > 0 ? "" : ", by its training poses alone", check_by(model.provenance()));
+                     rounded_up_mm(accuracy->at(PositionAccuracy::kShare)), hardly_judged(*accuracy),
+                     check_by(model.provenance()));
 }
 
 std::string certificate(const CompensatedModel& model, const std::optional<PositionAccuracy>& accuracy,

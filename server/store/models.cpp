@@ -250,6 +250,16 @@ std::optional<int> version_of_hash(SQLite::Database& database, const std::string
   return std::nullopt;
 }
 
+/// Writes a model's text anew where what is stored is something else.
+void mend_model(SQLite::Database& database, const std::string& cell, int version, const std::string& content,
+                const ChangeId& by) {
+  auto differs =
+      prepare(database, "SELECT 1 FROM models WHERE cell = ? AND version = ? AND content <> ?", cell, version, content);
+  if (!differs.executeStep()) return;
+  change(database, "UPDATE models SET content = ? WHERE cell = ? AND version = ?", content, cell, version);
+  record_audit(database, {cell, "mend", fmt::format("version {}", version), "damaged", "as it was"}, by);
+}
+
 /// The other server's number, if it is free here: what is stored already is not written over.
 int free_version(SQLite::Database& database, const std::string& cell, int wanted) {
   const bool taken =
@@ -273,6 +283,8 @@ Result<int> Store::adopt(const std::string& cell, const VersionInForce& decided,
                    {cell, "follow", fmt::format("version {}", *version), "", fmt::format("sha256 {}", decided.hash),
                     fmt::format("version {} there", decided.version)},
                    by);
+    } else if (model != nullptr) {
+      mend_model(database, cell, *version, content, by);
     }
     const auto present = present_activation(database, cell);
     if (present && present->version == *version) return *version;

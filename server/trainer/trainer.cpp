@@ -556,6 +556,11 @@ Result<int> Trainer::adopt(const std::string& cell, const VersionInForce& decide
   return version;
 }
 
+bool Trainer::serves(const std::string& cell, const std::string& hash) const {
+  const auto model = registry_.in_force(cell);
+  return model && model->model.provenance().hash == hash;
+}
+
 void Trainer::end_jobs_done_elsewhere(const std::string& cell, const std::string& by) {
   const auto model = registry_.in_force(cell);
   const auto unfinished = store_.unfinished_jobs();

@@ -127,6 +127,8 @@ class Trainer {
   /// See ModelHistory. Jobs that wait for batches which the model has learned from are done.
   [[nodiscard]] Result<int> adopt(const std::string& cell, const VersionInForce& decided, const std::string& text,
                                   const ChangeId& by);
+  /// Whether this model of the cell is served now.
+  [[nodiscard]] bool serves(const std::string& cell, const std::string& hash) const;
   [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const {
     return history_.load_for_service(cell, version);
   }

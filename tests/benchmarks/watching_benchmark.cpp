@@ -10,6 +10,7 @@
 #include "server/metrics/operation_counts.h"
 #include "tests/support/demand.h"
 #include "tests/support/http_client.h"
+#include "tests/support/own_ports.h"
 #include "tests/support/small_cell.h"
 #include "tests/support/temporary_folder.h"
 
@@ -63,7 +64,7 @@ void scrape() {
   Trainer trainer(served, *store, registry, {});
   for (const auto& [name, cell] : served)
     registry.publish(std::make_shared<const ServedModel>(ServedModel{name, 1, test::nominal_model(cell, 40)}));
-  const auto port = static_cast<std::uint16_t>(20003 + 4 * (::getpid() % 3000));
+  const auto port = test::own_ports();
   HttpServer http({"127.0.0.1", port},
                   {"server-a", "0.1.0", folder.file("t.db"), trainer, *store, registry, figures, [] {
                      return Movement{true, {}};

@@ -87,6 +87,30 @@ TEST(Jump, AReflectorThatWasPutOnAnewIsFoundHoweverFarOffItSits) {
   }
 }
 
+TEST(Jump, ATrackerThatWasMovedFarIsFoundWithItsPoseAndItsSize) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  for (const std::size_t poses : {40u, 80u}) {
+    for (const double mm : {3.0, 10.0, 50.0}) {
+      MeasurementBatch batch = measured_on(robot, {.poses = static_cast<int>(poses), .seed = 90 + poses});
+      const Matrix3 turn = rotation_exp(Vector3(0, 0, 2e-4 * mm));
+      double square = 0;
+      for (std::size_t i = poses / 2; i < poses; ++i) {
+        Measurement& m = batch.measurements[i];
+        const Vector3 before = m.p_W;
+        m.p_W = turn * m.p_W + mm * 1e-3 * Vector3(0.8, 0, -0.6);
+        if (m.R_WT) m.R_WT = (turn * *m.R_WT).eval();
+        square += (m.p_W - before).squaredNorm() / static_cast<double>(poses - poses / 2);
+      }
+      const auto jump = jump_within(cell, batch);
+      ASSERT_TRUE(jump) << poses << " poses, " << mm << " mm";
+      EXPECT_EQ(jump->source.substr(0, 13), "tracker_moved") << poses << " poses, " << mm << " mm";
+      EXPECT_EQ(jump->pose_id, batch.measurements[poses / 2].pose_id) << poses << " poses, " << mm << " mm";
+      EXPECT_NEAR(jump->effect, std::sqrt(square), 0.1 * std::sqrt(square)) << poses << " poses, " << mm << " mm";
+    }
+  }
+}
+
 TEST(Jump, WhatComesAndGoesOrSwaysIsNone) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);

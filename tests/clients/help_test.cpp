@@ -143,6 +143,8 @@ TEST_F(Help, DefaultsStandBehindWhatTheCommandLineSays) {
             (Words{"plan", "--count", "5", "--seed", "7", "--cell", "/data/cell-7.yaml"}));
   EXPECT_EQ(with_defaults(app_, {"jobs"}, path).value(), (Words{"jobs", "--port", "17501"})) << "all cells";
   EXPECT_EQ(with_defaults(app_, {"status"}, "").value(), (Words{"status"}));
+  const std::string by_notepad = folder_.write("bom", "\xef\xbb\xbfport = 17501\r\n");
+  EXPECT_EQ(with_defaults(app_, {"status"}, by_notepad).value(), (Words{"status", "--port", "17501"}));
   const auto unknown = with_defaults(app_, {"status"}, folder_.write("other", "port = 1\nprot = 2\n"));
   ASSERT_FALSE(unknown);
   EXPECT_EQ(unknown.error().row, 2);

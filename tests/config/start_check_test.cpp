@@ -13,6 +13,7 @@
 #include "server/dds/port_lock.h"
 #include "server/store/store.h"
 #include "tests/support/demand.h"
+#include "tests/support/own_ports.h"
 #include "tests/support/small_cell.h"
 #include "tests/support/temporary_folder.h"
 
@@ -21,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::uint16_t own_port() { return static_cast<std::uint16_t>(20000 + 4 * (::getpid() % 3000)); }
+using test::own_ports;
 
 class StartCheckTest : public testing::Test {
  protected:
@@ -35,7 +36,7 @@ class StartCheckTest : public testing::Test {
     server_ =
         folder_.write("server.yaml", fmt::format("version: 1\nserver: a\ncells: [cell-7.yaml, cell-8.yaml]\nstore: {}\n"
                                                  "dds: {{port: {}}}\n{}",
-                                                 store, own_port(), more));
+                                                 store, own_ports(), more));
   }
   /// cell-7 with `old` replaced.
   void change_cell(const std::string& old, const std::string& with) {
@@ -158,8 +159,8 @@ TEST_F(StartCheckTest, AStoreThatCouldNotBeOpenedIsNamed) {
 
 TEST_F(StartCheckTest, APortOrAnAddressThatCannotBeHadIsNamed) {
   {
-    const auto taken = test::demand(PortLock::take("127.0.0.1", own_port()));
-    expect_problem("server.yaml", "dds: port", std::to_string(own_port()));
+    const auto taken = test::demand(PortLock::take("127.0.0.1", own_ports()));
+    expect_problem("server.yaml", "dds: port", std::to_string(own_ports()));
   }
   EXPECT_EQ(problems(), "");
   server_ = folder_.write("server.yaml",
@@ -171,12 +172,19 @@ TEST_F(StartCheckTest, APortOrAnAddressThatCannotBeHadIsNamed) {
 TEST_F(StartCheckTest, TheServerThatRunsAlreadyIsANote) {
   const auto store = test::demand(Store::open(folder_.file("t.db")));
   expect_problem("server.yaml", "store", "t.db");
-  const auto port = test::demand(PortLock::take("127.0.0.1", own_port()));
+  const auto port = test::demand(PortLock::take("127.0.0.1", own_ports()));
   const StartCheck found = check_start(read_server(server_), server_);
   EXPECT_TRUE(found.problems.empty()) << sentence(found.problems.front());
   ASSERT_EQ(found.notes.size(), 3u);
   EXPECT_NE(found.notes[0].find("runs already"), std::string::npos);
   EXPECT_EQ(found.notes[1], "cell cell-7 has no model yet");
+}
+
+TEST_F(StartCheckTest, AFolderOfRecordsThatCannotBeMadeIsNamed) {
+  write_server("record: {folder: cell-7.yaml/records}\n");
+  expect_problem("server.yaml", "record: folder", "cell-7.yaml/records");
+  write_server("record: {folder: new/records}\n");
+  EXPECT_TRUE(check().problems.empty()) << problems();
 }
 
 TEST_F(StartCheckTest, ALogFileThatCannotBeWrittenIsNamed) {
@@ -188,11 +196,11 @@ TEST_F(StartCheckTest, APortForPagesThatIsTakenIsAProblem) {
   const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in to{};
   to.sin_family = AF_INET;
-  to.sin_port = htons(static_cast<std::uint16_t>(own_port() + 1));
+  to.sin_port = htons(static_cast<std::uint16_t>(own_ports() + 1));
   to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   ASSERT_EQ(::bind(socket, reinterpret_cast<const sockaddr*>(&to), sizeof(to)), 0);
   ASSERT_EQ(::listen(socket, 1), 0);
-  write_server(fmt::format("http: {{port: {}}}\n", own_port() + 1));
+  write_server(fmt::format("http: {{port: {}}}\n", own_ports() + 1));
   expect_problem("server.yaml", "http: port");
   ::close(socket);
   const StartCheck free = check();

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <map>
 #include <memory>
@@ -13,6 +12,7 @@
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
 #include "server/trainer/trainer.h"
+#include "tests/support/own_ports.h"
 #include "tests/support/small_cell.h"
 #include "tests/support/temporary_folder.h"
 
@@ -72,14 +72,12 @@ struct Backend {
   std::unique_ptr<Trainer> trainer;
 };
 
-/// A domain and a port that no other test process uses; below the range that the system gives away by itself, above the
-/// ports that DDS derives from the domain.
+/// A domain and a port of this test's own.
 inline DdsOptions test_dds_options() {
   static int count = 0;
   DdsOptions options;
-  const int process = static_cast<int>(::getpid());
-  options.domain = static_cast<std::uint32_t>(1 + process % 48);
-  options.port = static_cast<std::uint16_t>(20000 + 8 * (process % 1500) + 4 * (count++ % 2));
+  options.domain = own_domain();
+  options.port = static_cast<std::uint16_t>(own_ports() + 4 * (count++ % 2));
   options.server_id = "server-a";
   return options;
 }

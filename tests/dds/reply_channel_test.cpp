@@ -1,10 +1,10 @@
 #include "server/dds/reply_channel.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "server/dds/codec.h"
 #include "server/dds/sent_type.h"
+#include "tests/support/own_ports.h"
 
 namespace trammel {
 namespace {
@@ -18,8 +18,7 @@ class ParkedChannelsTest : public testing::Test {
   }
 
   wire::ParticipantPtr participant_ =
-      wire::make_participant({"parked", 42, "127.0.0.1", static_cast<std::uint16_t>(30000 + ::getpid() % 3000), {}})
-          .value();
+      wire::make_participant({"parked", 42, "127.0.0.1", test::own_ports(), {}}).value();
   ParkedChannels parked_;
   ParkedChannels::Time now_ = std::chrono::steady_clock::now();
 };

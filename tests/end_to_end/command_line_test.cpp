@@ -573,6 +573,23 @@ TEST_F(CommandLine, TheReportIsOnePageWithItsChartsInside) {
   EXPECT_EQ(page.find("{{"), std::string::npos);
 }
 
+TEST_F(CommandLine, PosesThatAModelWasTrainedOnDoNotJudgeIt) {
+  const std::string batch = measure("b", 60, 1), fresh = measure("f", 30, 2);
+  const std::string model = train(batch, "M2");
+  const auto page_of = [&](const std::string& of, const std::string& said) {
+    const Finished told = must({"report", "--model", model, "--batch", of, "-o", file("r.html")});
+    EXPECT_NE(told.out.find(said), std::string::npos) << told.out;
+    return test::read_file(file("r.html"));
+  };
+  const auto evaluated = [&](const std::string& of) {
+    return json::parse(must({"evaluate", "--model", model, "--batch", of, "--json", "-"}).out);
+  };
+  EXPECT_NE(page_of(batch, "60 of the 60 poses").find("none was held out"), std::string::npos);
+  EXPECT_NE(page_of(fresh, "report of model").find("30 poses that were not trained on"), std::string::npos);
+  EXPECT_EQ(evaluated(batch).at("trained_on"), 60);
+  EXPECT_FALSE(evaluated(fresh).contains("trained_on"));
+}
+
 /// A truth file whose joint 3 oscillates besides, which the shipped cell does not know.
 std::string oscillating_truth(const test::TemporaryFolder& folder) {
   std::string truth = test::read_file(kTruth);

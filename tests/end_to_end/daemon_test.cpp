@@ -128,6 +128,20 @@ TEST_F(DaemonTest, ServesTheSameModelAfterARestart) {
   EXPECT_EQ(after.hash, before.hash);
 }
 
+TEST_F(DaemonTest, WhatItKeepsIsForItsOwnUserOnly) {
+  wait_for(submit("lt-07", 60));
+  int files = 0;
+  const std::string name = std::filesystem::path(daemon_.store_path()).filename();
+  for (const auto& entry :
+       std::filesystem::recursive_directory_iterator(std::filesystem::path(daemon_.store_path()).parent_path())) {
+    if (!entry.is_regular_file() || entry.path().string().find(name) == std::string::npos) continue;
+    ++files;
+    const auto for_others = std::filesystem::perms::others_all | std::filesystem::perms::group_all;
+    EXPECT_EQ(entry.status().permissions() & for_others, std::filesystem::perms::none) << entry.path();
+  }
+  EXPECT_GE(files, 2) << "the store and the copy of its model";
+}
+
 TEST_F(DaemonTest, EndsCleanlyWhenAskedToAndSaysSo) {
   EXPECT_EQ(daemon_.stop(), 0) << daemon_.process().standard_error();
   EXPECT_NE(daemon_.process().standard_error().find("stopped"), std::string::npos);

@@ -109,19 +109,23 @@ class ExportRobot : public testing::Test {
   }
 
   /// Plans, measures and trains; the model is in cell.model, the predictions at the plan in where.csv.
-  void train(const std::string& robot, const std::string& truth, const std::string& level) {
+  void train(const std::string& robot, const std::string& truth, const std::string& level,
+             const std::string& more_tools = "") {
     folder_.write("cell.yaml",
                   "version: 1\ncell: c\nrobot: " TRAMMEL_SOURCE_DIR "/models/" + robot +
                       "\nbase: {xyz_mm: [100, -200, 300], q_wxyz: [0.8, 0, 0, 0.6]}\ngravity: [0, 0, -1]\n"
-                      "tools: {drill: {xyz_mm: [100, 0, 150], q_wxyz: [0.8, 0, 0.6, 0]}}\n"
+                      "tools: {" +
+                      more_tools +
+                      "drill: {xyz_mm: [100, 0, 150], q_wxyz: [0.8, 0, 0.6, 0]}}\n"
                       "payloads: {drill: {mass_kg: 20, cog_mm: [0, 0, 100]}}\ntracker: {sigma_mm: 0.01}\n");
     folder_.write("truth.yaml", "version: 1\nerror_sources:\n" + truth + "noise: {sigma_mm: 0.01}\n");
     must({"plan", "--cell", file("cell.yaml"), "--count", "60", "-o", file("plan.csv")});
-    must({"simulate", "--cell", file("cell.yaml"), "--truth", file("truth.yaml"), "--plan", file("plan.csv"), "-o",
-          file("batch.csv")});
+    must({"simulate", "--cell", file("cell.yaml"), "--truth", file("truth.yaml"), "--plan", file("plan.csv"), "--tool",
+          "drill", "-o", file("batch.csv")});
     must({"train", "--cell", file("cell.yaml"), "--batch", file("batch.csv"), "--level", level, "--bias", "none", "-o",
           file("cell.model")});
-    must({"predict", "--model", file("cell.model"), "--joints", file("plan.csv"), "-o", file("where.csv")});
+    must({"predict", "--model", file("cell.model"), "--joints", file("plan.csv"), "--tool", "drill", "-o",
+          file("where.csv")});
     must({"export-robot", "--model", file("cell.model"), "-o", file("robot.urdf"), "--table", file("robot.csv"),
           "--json", file("robot.json")});
   }
@@ -168,6 +172,15 @@ TEST_F(ExportRobot, AsUrdfHasTheToolWhereOursIsWithinAMicrometre) {
     for (const double distance : distances) EXPECT_LT(distance, 1e-3);
     EXPECT_TRUE(json::parse(test::read_file(file("robot.json")))["left_out"].empty());
   }
+}
+
+TEST_F(ExportRobot, ToolsWhoseNamesAreAlikeInUrdfStayTwo) {
+  train("fanuc_m-20ia.yaml", kRigid, "M2",
+        "\"a b\": {xyz_mm: [1, 0, 0], q_wxyz: [1, 0, 0, 0]}, a_b: {xyz_mm: [2, 0, 0], "
+        "q_wxyz: [1, 0, 0, 0]}, ");
+  const auto joints = read_urdf(test::read_file(file("robot.urdf")));
+  EXPECT_EQ(joints.at("tool_a_b").origin[0], 0.001);
+  EXPECT_EQ(joints.at("tool_a_b_2").origin[0], 0.002);
 }
 
 TEST_F(ExportRobot, SaysInMillimetresWhatUrdfCannotCarry) {

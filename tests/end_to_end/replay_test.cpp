@@ -117,6 +117,37 @@ TEST_F(ReplayTest, AnotherDomainAnotherBranchAndAnErrorThatWasNotKnownAreDiffere
   EXPECT_EQ(differs("\"error_after_mm\":0.", "\"error_after_mm\":null,\"was\":0."), 1);
 }
 
+TEST_F(ReplayTest, ADamagedLineIsLeftOutAndSaidWithItsPlace) {
+  std::string text = test::read_file(only_record());
+  text.insert(text.find('\n') + 1, std::string(4096, '\0') + "\n");
+  const auto replayed = replay(1, folder_.write("torn.jsonl", text));
+  EXPECT_EQ(replayed.exit_code, 1) << replayed.out << replayed.err;
+  const json told = json::parse(replayed.out);
+  EXPECT_EQ(told.at("requests"), 3);
+  EXPECT_EQ(told.at("different"), 0);
+  EXPECT_EQ(told.at("damaged_lines"), 1);
+  EXPECT_NE(told.at("first_damaged").get<std::string>().find("row 2"), std::string::npos) << told.dump();
+}
+
+TEST_F(ReplayTest, OfTheRecordsOfSeveralCellsThoseOfTheModelsCellAreAskedAgain) {
+  std::string text = test::read_file(only_record());
+  const auto make_other = [&] {
+    const std::size_t at = text.find("\"cell-7\"");
+    if (at != std::string::npos) text.replace(at, 8, "\"cell-8\"");
+    return at != std::string::npos;
+  };
+  ASSERT_TRUE(make_other());
+  const auto replayed = replay(1, folder_.write("both.jsonl", text));
+  EXPECT_EQ(replayed.exit_code, 0) << replayed.out << replayed.err;
+  const json told = json::parse(replayed.out);
+  EXPECT_EQ(told.at("requests"), 2);
+  EXPECT_EQ(told.at("other_cells"), json({"cell-8"}));
+  while (make_other()) continue;
+  const auto none = replay(1, folder_.write("other.jsonl", text));
+  EXPECT_EQ(none.exit_code, 3) << none.out;
+  EXPECT_NE(none.err.find("cell-8"), std::string::npos) << none.err;
+}
+
 TEST_F(ReplayTest, WhatIsNoRecordIsRefusedWithItsLine) {
   const auto refused = replay(1, folder_.write("no.jsonl", "{\"record\":1}\n"));
   EXPECT_EQ(refused.exit_code, 3) << refused.out;

@@ -1,4 +1,5 @@
 // Two servers of the same cell as processes: one writes, the other follows.
+#include <SQLiteCpp/SQLiteCpp.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -110,6 +111,16 @@ class ReplicasTest : public testing::Test {
     return kept.find(batch) != std::string::npos;
   }
 
+  /// Asks this one alone.
+  static bool wait_until_it_answers(const test::Daemon& daemon) {
+    const auto session = client::Session::open(daemon.session_options());
+    if (!session) return false;
+    for (const auto until = steady_clock::now() + kLimit; steady_clock::now() < until;) {
+      if ((*session)->predict_error(kContext, test::virtual_joints(3, 7))) return true;
+    }
+    return false;
+  }
+
   test::Daemon first_{0}, second_{1};
   std::vector<std::string> files_;
   std::unique_ptr<client::Session> session_;
@@ -156,6 +167,22 @@ TEST_F(ReplicasTest, AFollowerServesWhatTheWriterPutInForceAlsoAfterItsOwnRestar
   ASSERT_TRUE(answer) << sentence(answer.error());
   EXPECT_EQ(answer->model.version, 1);
   EXPECT_EQ(answer->model.batch_id, "lt-1");
+}
+
+TEST_F(ReplicasTest, AModelThatAFollowerCannotLoadComesFromTheWriterOnceMore) {
+  give_usual_parts();
+  start_both();
+  learn("lt-1", 1);
+  ASSERT_TRUE(wait_until(same));
+  second_.kill();
+  SQLite::Database(second_.store_path(), SQLite::OPEN_READWRITE).exec("UPDATE models SET content = 'damaged'");
+  std::filesystem::remove_all(second_.store_path() + ".models");
+  second_.start();
+  ASSERT_TRUE(wait_until_it_answers(second_)) << second_.process().standard_error();
+  first_.kill();
+  second_.kill();
+  second_.start();
+  EXPECT_TRUE(wait_until_it_answers(second_)) << "it was not stored: " << second_.process().standard_error();
 }
 
 TEST_F(ReplicasTest, ARollbackIsFollowedThoughItsVersionIsLower) {

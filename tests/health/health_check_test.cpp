@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <random>
 
 #include "server/base/units.h"
 #include "server/measurement/files/batch_file.h"
@@ -226,6 +227,39 @@ TEST_F(HealthTest, OfPosesThatAreFarOffOnlyAnotherToolIsNamed) {
   if (!nothing) return;  // taken for a mistake of reading
   EXPECT_EQ(nothing->verdict, HealthVerdict::kCannotTell) << nothing->sentence;
   EXPECT_TRUE(nothing->changed.empty());
+}
+
+TEST_F(HealthTest, OfTwoThingsThatChangedBothAreNamedAndNoThird) {
+  for (const auto& [one, other] : {std::pair(2, 3), std::pair(2, 5), std::pair(3, 5), std::pair(3, 4)}) {
+    const hidden::Effect first = effect({"joint_slip", one + 1, "", 0, {}, 0}, 0.2);
+    const hidden::Effect second = effect({"joint_slip", other + 1, "", 0, {}, 0}, 0.15);
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      const HealthCheck check = checked(*robot_, {{first, second}}, seed, tolerance_mm(0.05));
+      ASSERT_EQ(check.changed.size(), 2u) << check.sentence;
+      for (const int joint : {one, other}) {
+        const auto is = [&](const SingleCause& cause) { return is_joint_slip(cause, joint); };
+        EXPECT_TRUE(std::any_of(check.changed.begin(), check.changed.end(),
+                                [&](const SeenChange& change) {
+                                  const auto& others = change.could_also_be;
+                                  return is(change.cause) || std::any_of(others.begin(), others.end(), is);
+                                }))
+            << "joint " << joint + 1 << ": " << check.sentence;
+      }
+    }
+  }
+}
+
+TEST_F(HealthTest, NoCauseIsSaidToDoFarMoreThanThePosesAreOff) {
+  const Cell& cell = robot_->model.cell();
+  hidden::Random random(11);
+  std::normal_distribution<double> normal;
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    MeasurementBatch batch = test::measured_check(*robot_, {}, seed);
+    for (Measurement& m : batch.measurements) m.p_W += 2e-3 * Vector3(normal(random), normal(random), normal(random));
+    const auto check = check_health(robot_->model, check_against_cell(batch, cell).value(), tolerance_mm(0.05));
+    if (!check) continue;  // taken for a mistake of reading
+    for (const SeenChange& change : check->changed) EXPECT_LT(change.effect_rms, 0.05) << seed << check->sentence;
+  }
 }
 
 TEST_F(HealthTest, ACauseThatExplainsAsMuchWithMoreNumbersIsSaidToBePossible) {

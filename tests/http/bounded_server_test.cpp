@@ -1,7 +1,6 @@
 #include "server/http/bounded_server.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <deque>
 #include <latch>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "tests/support/http_client.h"
+#include "tests/support/own_ports.h"
 
 namespace trammel {
 namespace {
@@ -35,7 +35,7 @@ class BoundedServerTest : public testing::Test {
   }
   static int code_of(const std::string& request) { return parse_http(http_exchange(kPort, request)).code; }
 
-  inline static const auto kPort = static_cast<std::uint16_t>(20002 + 4 * (::getpid() % 3000));
+  inline static const auto kPort = test::own_ports();
   std::unique_ptr<BoundedServer> server_;
 };
 
@@ -142,6 +142,7 @@ TEST_F(BoundedServerTest, MoreRequestsThanMayWaitAreSentAwayAtOnce) {
   EXPECT_EQ(parse_http(waiting.back()->read(seconds(10))).code, 503);
   over.count_down();
   EXPECT_EQ(parse_http(waiting.front()->read(seconds(10))).body, "late") << "who came first is served";
+  server_.reset();  // its handler waits for the latch
 }
 
 TEST_F(BoundedServerTest, WhatHasAWorkerOfItsOwnIsAnsweredWhileEverythingElseIsHeldUp) {
@@ -161,6 +162,7 @@ TEST_F(BoundedServerTest, WhatHasAWorkerOfItsOwnIsAnsweredWhileEverythingElseIsH
   EXPECT_EQ(http_get(kPort, "/healthz").body, "healthz|");
   over.count_down();
   EXPECT_EQ(parse_http(others.front()->read(seconds(10))).body, "page|");
+  server_.reset();  // its handler waits for the latch
 }
 
 TEST_F(BoundedServerTest, AHandlerThatThrowsIsAnAnswer) {

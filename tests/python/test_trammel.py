@@ -11,6 +11,7 @@ import os
 import pathlib
 import pickle
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -266,6 +267,92 @@ class Refusals(unittest.TestCase):
             trammel.Session(domain=41, ports=[19999], timeout_s=0.2).status()
 
 
+    def test_a_path_where_a_cell_or_a_batch_belongs_says_what_is_needed(self):
+        with self.assertRaisesRegex(trammel.Usage, r"cell is of type str: a Cell \(Cell.load"):
+            trammel.train("cell-7.yaml", self.batch)
+        for wrong in ("lt.csv", 7, [self.batch, "lt.csv"], None):
+            with self.assertRaisesRegex(trammel.Usage, r"batches is of type \w+: a Batch \(Batch.load"):
+                trammel.train(self.cell, wrong)
+        with self.assertRaises(trammel.Usage):
+            trammel.plan(CELL, 20)
+
+    def test_columns_of_arrays_have_a_value_for_each_pose_or_one_for_all(self):
+        joints, position = np.zeros((2, 6)), np.ones((2, 3))
+        batch = trammel.Batch.from_arrays(joints, position, pose_id=["a,b", 'c"d'], temperature_c=21.5)
+        rows = list(csv.DictReader(io.StringIO(batch.csv())))
+        self.assertEqual([(row["pose_id"], row["temperature_c"]) for row in rows], [("a,b", "21.5"), ('c"d', "21.5")])
+        with self.assertRaisesRegex(trammel.Usage, "pose_id: 1 values, 2 are needed"):
+            trammel.Batch.from_arrays(joints, position, pose_id=["a"])
+        with self.assertRaisesRegex(trammel.Usage, "position_mm"):
+            trammel.Batch.from_arrays(joints, [["far", "away", "!"]] * 2)
+
+
+    def test_columns_of_frames_are_never_taken_for_others(self):
+        try:
+            import pandas
+        except ImportError:
+            self.skipTest("no pandas here")
+        joints = pandas.DataFrame(np.full((3, 6), [10.0, -30, 40, 0, 30, 0]), columns=[f"q{j}_deg" for j in range(1, 7)])
+        right = self.model.predict(joints).error_mm
+        np.testing.assert_array_equal(self.model.predict(joints.iloc[:, ::-1].rename(columns=str.upper)).error_mm, right)
+        np.testing.assert_array_equal(self.model.predict(joints.iloc[0][::-1]).error_mm, right[:1])
+        for wrong, says in ((joints.rename(columns=lambda name: name.replace("deg", "rad")), "missing column q1_deg"),
+                            (joints.rename(columns={"q3_deg": "q7_deg"}), "missing column q3_deg"),
+                            (joints.rename(columns={"q3_deg": "q3_mm"}), "missing column q3_deg"),
+                            (joints.assign(q7_deg=0.0), "7 columns of joints, 6 are needed"),
+                            (joints.assign(Q1_DEG=0.0), "two columns q1_deg"),
+                            (joints.assign(temperature_c=[20.0, 21.0, 20.0]), "the rows differ in temperature_c")):
+            with self.assertRaisesRegex(trammel.Usage, says):
+                self.model.predict(wrong)
+        targets = joints.assign(**dict(zip(("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"), self.model.predict(joints).nominal.T)))
+        self.assertEqual(self.model.correct(targets.rename(columns=str.upper)).status, ["ok"] * 3)
+        for wrong, says in ((targets.drop(columns="qw"), "missing column qw"),
+                            (targets.drop(columns=["qw", "qx", "qy", "qz"]), "missing column qw"),
+                            (joints.assign(x_m=1.8, y_m=0.1, z_m=1.2), "column x_m is no position in mm")):
+            with self.assertRaisesRegex(trammel.Usage, says):
+                self.model.correct(wrong)
+        with self.assertRaises(trammel.TrammelError):
+            self.model.predict(joints.assign(tool_id="no-such-tool"))
+        with self.assertRaisesRegex(trammel.Usage, "column tool_id says 'other'"):
+            self.model.predict(joints.assign(tool_id="other"), tool="spindle")
+        with self.assertRaisesRegex(trammel.Usage, "corrected already"):
+            self.model.correct(self.model.correct(targets).frame())
+
+    def test_numbers_that_would_be_cut_are_refused(self):
+        joints = np.array([[10.0, -30, 40, 0, 30, 0]])
+        pose = self.model.predict(joints).nominal
+        for wrong in (2**32, 1.9, True, float("nan"), "0", [0.5]):
+            with self.assertRaises(trammel.TrammelError, msg=repr(wrong)):
+                self.model.correct(pose, conf=wrong)
+        self.assertEqual(len(self.model.correct(pose, conf=2.0)), 1)
+        for wrong in (joints + 1j, np.ma.masked_less(joints, 0)):
+            with self.assertRaises(trammel.Usage):
+                self.model.predict(wrong)
+
+
+    def test_a_share_that_is_none_and_numbers_that_are_masked_are_refused(self):
+        for share in (-0.1, 1.0, 2.0, float("nan")):
+            with self.assertRaisesRegex(trammel.Usage, "validation_share"):
+                trammel.train(self.cell, self.batch, level="M1", bias="none", validation_share=share)
+        with self.assertRaisesRegex(trammel.Usage, "position_mm: some values are masked"):
+            trammel.Batch.from_arrays(np.zeros((2, 6)), np.ma.masked_array(np.ones((2, 3)), mask=np.eye(2, 3)))
+
+    def test_the_frame_of_a_batch_is_the_same_whatever_its_file_looks_like(self):
+        try:
+            import pandas
+        except ImportError:
+            self.skipTest("no pandas here")
+        text = self.batch.csv()
+        plain = trammel.Batch.parse(text, "plain").frame()
+        self.assertEqual(len(plain), 40)
+        head, rest = text[:text.index("\n")], text[text.index("\n"):]
+        for odd in (text.replace(",", ";").replace(".", ","), text.replace(",", "\t"), head.upper() + rest, "sep=;\n" + text.replace(",", ";")):
+            pandas.testing.assert_frame_equal(trammel.Batch.parse(odd, "odd").frame(), plain)
+        named = trammel.Batch.parse(text.replace("\n1,", "\np#1,"), "named").frame()
+        self.assertEqual(named["pose_id"][0], "p#1")
+        np.testing.assert_array_equal(named["x_mm"], plain["x_mm"])
+
+
 class Threads(unittest.TestCase):
     """Long work leaves the interpreter to others."""
 
@@ -333,6 +420,21 @@ class Threads(unittest.TestCase):
             trammel.train(cell, batch, progress=lambda stage, share: os.kill(os.getpid(), signal.SIGINT))
 
 
+def own_ports(case):
+    """The first of eight ports that no other test has while this one lives (as tests/support/own_ports.cpp has it)."""
+    for tried in range(1500):
+        block = (os.getpid() + tried) % 1500
+        held = socket.socket(socket.AF_UNIX)
+        try:
+            held.bind(f"\0trammel-test-ports-{block}")
+        except OSError:
+            held.close()
+            continue
+        case.addClassCleanup(held.close)
+        return 20000 + 8 * block
+    raise RuntimeError("no ports are left for this test")
+
+
 class Service(unittest.TestCase):
     """A session asks a daemon of its own."""
 
@@ -340,7 +442,8 @@ class Service(unittest.TestCase):
     def setUpClass(cls):
         folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(folder.cleanup)
-        port, domain = 20000 + 4 * (os.getpid() % 3000), 1 + os.getpid() % 40
+        port = own_ports(cls)
+        domain = 1 + port // 8 % 48
         text = CELL.read_text().replace("../models", str(SOURCE / "models")).replace("bias: auto", "bias: none")
         (pathlib.Path(folder.name) / "cell-7.yaml").write_text(text)
         config = pathlib.Path(folder.name) / "server.yaml"
@@ -364,6 +467,16 @@ class Service(unittest.TestCase):
         self.assertTrue(self.ended["in_force"], self.ended)
         self.assertEqual([job["id"] for job in self.session.jobs("cell-7")], [self.ended["id"]])
         self.assertTrue(self.session.models()[0]["in_force"])
+
+    def test_what_is_no_session_and_no_list_of_joints_is_refused(self):
+        for wrong in (dict(domain=233), dict(timeout_s=float("inf")), dict(timeout_s=float("nan")), dict(timeout_s=0)):
+            with self.assertRaises(trammel.Usage, msg=repr(wrong)):
+                trammel.Session(**wrong)
+        joints = self.planned.joints_deg[:2]
+        for wrong in (joints.T, joints.reshape(-1), joints[:1].T):
+            with self.assertRaises(trammel.TrammelError):
+                self.session.predict("cell-7", wrong)
+        self.assertEqual(len(self.session.predict("cell-7", joints[0])), 1)
 
     def test_answers_as_its_model_does_offline(self):
         model = trammel.Model.parse(self.session.export_model("cell-7"))

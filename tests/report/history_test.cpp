@@ -67,6 +67,21 @@ TEST(History, ThePageShowsTrainingsEventsAndNotesAndWhatComesFromOutsideIsHarmle
   EXPECT_FALSE(has(page, "<script>"));
 }
 
+TEST(History, TheParametersAreThoseOfTheVersionInForceNotOfTheNewest) {
+  CellHistory history{"cell-7",
+                      {version(1, zero_of_joint_3(1e-3, 1e-5)), version(2, zero_of_joint_3(2e-3, 1e-5)),
+                       version(3, zero_of_joint_3(3e-3, 1e-5))}};
+  history.versions[1].in_force = true;
+  const std::string page = history_page(history);
+  EXPECT_TRUE(has(page, "version 2 (in force)"));
+  EXPECT_TRUE(has(page, "0.1146 ±")) << "2 mrad in deg";
+  EXPECT_FALSE(has(page, "0.1719 ±")) << "of version 3";
+  history.versions[1].in_force = false;
+  history.of_files = true;
+  EXPECT_TRUE(has(history_page(history), "Model files do not say which version is in force."));
+  EXPECT_TRUE(has(history_page(history), "0.1719 ±"));
+}
+
 TEST(History, OfNothingIsAPageThatSaysSo) {
   const std::string page = history_page({"cell-7"});
   EXPECT_TRUE(has(page, "No version in force is on record."));

@@ -177,6 +177,9 @@ TEST_F(ModelPage, SaysFirstWhereNoPoseHasTestedIt) {
   EXPECT_TRUE(has(promise_sentence(model, PositionAccuracy::of(model)), " volume, by its training poses alone; not"));
   const auto tested = PositionAccuracy::of(model, check_against_cell(batch_, *cell_)->rows());
   EXPECT_TRUE(has(promise_sentence(model, tested), " volume; not known beyond"));
+  MeasurementBatch single = check_against_cell(batch_, *cell_)->rows();
+  single.measurements.resize(1);
+  EXPECT_TRUE(has(promise_sentence(model, PositionAccuracy::of(model, single)), ", tested by 1 fresh pose only; not"));
 }
 
 TEST_F(ModelPage, SaysThatTheDayOfTheNextCheckHasPassedWhereItHas) {

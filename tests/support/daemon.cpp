@@ -2,19 +2,14 @@
 
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <unistd.h>
 
+#include "tests/support/own_ports.h"
 #include "tests/support/virtual_cell.h"
 
 namespace trammel::test {
 namespace {
 
 constexpr std::chrono::seconds kLimit{30};
-
-// DDS derives ports from the domain, 7400 + 250 a domain: these stay below the servers' ports, those below the ports
-// that the kernel hands out.
-std::uint32_t domain_of_this_process() { return 1 + static_cast<std::uint32_t>(::getpid()) % 40; }
-std::uint16_t port_of_this_process() { return static_cast<std::uint16_t>(20000 + 4 * (::getpid() % 3000)); }
 
 /// The shipped cell, but that a bias is always learned: a training takes its time, and there is one to be served.
 std::string cell_with_a_bias() {
@@ -33,8 +28,7 @@ std::string cell_with_a_bias() {
 
 std::string trammeld_path() { return TRAMMEL_BINARY_DIR "/server/trammeld"; }
 
-Daemon::Daemon(int replica)
-    : port_(static_cast<std::uint16_t>(port_of_this_process() + 2 * replica)), domain_(domain_of_this_process()) {
+Daemon::Daemon(int replica) : port_(static_cast<std::uint16_t>(own_ports() + 2 * replica)), domain_(own_domain()) {
   folder_.write("cell-7.yaml", cell_with_a_bias());
   folder_.write(
       "server.yaml",

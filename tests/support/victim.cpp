@@ -13,6 +13,7 @@
 #include <string>
 
 #include "idl/transport.h"
+#include "tests/support/own_ports.h"
 #include "tests/support/raw_participant.h"
 
 namespace trammel::test {
@@ -63,7 +64,7 @@ void limit(int resource, rlim_t most) {
 
 }  // namespace
 
-Victim::Victim(bool guarded) : port_(static_cast<std::uint16_t>(34000 + 2 * (::getpid() % 4000) + (guarded ? 1 : 0))) {
+Victim::Victim(bool guarded) : port_(static_cast<std::uint16_t>(own_ports() + (guarded ? 1 : 0))) {
   int ready[2];
   if (::pipe(ready) != 0) throw std::runtime_error("no pipe");
   process_ = ::fork();

@@ -48,11 +48,12 @@ Result<CellHistory> history_of_files(const HistoryArguments& arguments) {
     if (model->cell().name != history.cell) {
       return refused("the model is of cell {}, the ones before it are of {}", model->cell().name, history.cell)
           .in(path)
-          .of("cell");
+          .of("cell")
+          .next("give models of one cell");
     }
     history.versions.push_back(on_record(*model, static_cast<int>(history.versions.size()) + 1));
   }
-  history.versions.back().in_force = true;  // the newest of the files
+  history.of_files = true;
   return history;
 }
 

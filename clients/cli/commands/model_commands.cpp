@@ -201,6 +201,12 @@ std::string located_text(const InWorld& world) {
                      fmt::join(world.located, ", "));
 }
 
+std::string learned_text(std::ptrdiff_t poses) {
+  if (poses == 0) return "";
+  return fmt::format(
+      "note: the model was trained on {} of these poses: they say how well it fits, not how well it predicts\n", poses);
+}
+
 Status check_outputs(const EvaluateArguments& arguments) {
   if (arguments.residuals.empty()) return {};
   Outputs outputs;
@@ -227,9 +233,12 @@ Status evaluate(const EvaluateArguments& arguments) {
   }
   const MeasurementBatch positions = positions_of(world->batch);
   const CompensatedModel::LevelErrors errors = model->errors_B(positions);
+  const auto learned = std::count_if(world->batch.measurements.begin(), world->batch.measurements.end(),
+                                     LearnedFrom(*model, batch->hash()));
   const std::string structure = positions.measurements.empty() ? "" : structure_note(*model, positions, errors);
   tell(fmt::format("model {} on {} poses of {}:\n", model->provenance().id, rows_of(evaluation), batch->id()) +
-           evaluation_table(evaluation) + located_text(*world) + (structure.empty() ? "" : "note: " + structure + "\n"),
+           evaluation_table(evaluation) + located_text(*world) + learned_text(learned) +
+           (structure.empty() ? "" : "note: " + structure + "\n"),
        {arguments.json, arguments.residuals});
   if (!arguments.residuals.empty()) {
     const Status written =
@@ -240,6 +249,7 @@ Status evaluate(const EvaluateArguments& arguments) {
   }
   nlohmann::ordered_json json = evaluation_json(evaluation);
   if (!structure.empty()) json["structure"] = structure;
+  if (learned > 0) json["trained_on"] = learned;
   return write_json(arguments.json, json);
 }
 
@@ -251,19 +261,24 @@ Status report(const ReportArguments& arguments) {
   const Result<CompensatedModel> model = load_model(arguments.model);
   if (!model) return tl::make_unexpected(model.error());
   std::optional<MeasurementBatch> batch;
+  std::string note;
   if (!arguments.batch.empty()) {
     const Result<CheckedBatch> checked = read_checked_batches({arguments.batch}, model->cell());
     if (!checked) return tl::make_unexpected(checked.error());
     if (const Status positions = require_positions(checked->rows(), "report --batch"); !positions) return positions;
     Result<InWorld> world = in_world_of(*model, checked->rows());
     if (!world) return tl::make_unexpected(world.error());
-    batch = std::move(world->batch);
+    const std::size_t learned = std::erase_if(world->batch.measurements, LearnedFrom(*model, checked->hash()));
+    if (!world->batch.measurements.empty()) batch = std::move(world->batch);
+    if (learned > 0)
+      note = fmt::format("note: {} of the {} poses of {} do not judge the model, because it was trained on them\n",
+                         learned, checked->size(), arguments.batch);
   }
   if (const Status written =
           write_output(arguments.output, with_pages_beside(model_page(*model, batch), arguments.output));
       !written)
     return written;
-  tell(fmt::format("report of model {} in {}\n", model->provenance().id, arguments.output),
+  tell(note + fmt::format("report of model {} in {}\n", model->provenance().id, arguments.output),
        {arguments.output, arguments.json});
   return write_json(arguments.json, model_json(*model));
 }

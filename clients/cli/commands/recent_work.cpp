@@ -26,21 +26,23 @@ Result<ordered_json> asked_of_service(const std::string& reference, const Servic
 
 }  // namespace
 
-Status tell_recent_work(const RecentWorkArguments& arguments, const ServiceOptions& service) {
+Result<double> tell_recent_work(const RecentWorkArguments& arguments, const ServiceOptions& service) {
   Outputs outputs;
   outputs.add("--next-poses", arguments.next_poses);
   outputs.add("--json", arguments.json);
-  if (const Status good = outputs.check({}); !good) return good;
+  if (const Status good = outputs.check({}); !good) return tl::make_unexpected(good.error());
   const Result<ordered_json> json = asked_of_service(arguments.model, service);
   if (!json) return tl::make_unexpected(json.error());
+  double differs_mm = 0;
   try {
+    if (!json->at("other").is_null()) differs_mm = json->at("difference").at("max_mm").get<double>();
     tell(work_text(*json), {arguments.json, arguments.next_poses});
     if (!json->at("next_poses").empty()) outputs.put("--next-poses", next_poses_csv(*json));
   } catch (const ordered_json::exception& error) {
     return failure(ErrorCode::kInternal, "the service's replay is none: {}", error.what());
   }
   outputs.put("--json", json_text(*json));
-  return outputs.write();
+  return outputs.write().map([&] { return differs_mm; });
 }
 
 }  // namespace trammel::cli

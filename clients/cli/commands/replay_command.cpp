@@ -39,10 +39,12 @@ struct Different {
 struct Replayed {
   std::size_t requests = 0, items = 0, different = 0;
   double largest_mm = 0;
-  std::vector<Different> told;       ///< the largest first
-  std::set<std::string> models;      ///< that answered then
-  std::set<std::string> models_now;  ///< likewise, by hash
-  std::size_t of_other_models = 0;   ///< requests that another model answered then
+  std::vector<Different> told;        ///< the largest first
+  std::set<std::string> models;       ///< that answered then
+  std::set<std::string> models_now;   ///< likewise, by hash
+  std::size_t of_other_models = 0;    ///< requests that another model answered then
+  std::set<std::string> other_cells;  ///< that the records have beside the model's
+  std::vector<DamagedLines> damaged;  ///< by what was given to read
 };
 
 double distance(const client::PoseMm& a, const client::PoseMm& b) {
@@ -122,11 +124,6 @@ using Ask = std::function<Result<Answers>(const RecordedCall&)>;
 
 Result<Answers> answered_here(const CompensatedModel& model, const RecordedCall& call) {
   const Cell& cell = model.cell();
-  if (call.cell != cell.name)
-    return refused("a request of cell {}, and the model is of cell {}", call.cell, cell.name)
-        .in(call.file)
-        .at_row(call.line)
-        .of("cell");
   const auto at_line = [&](const Error& error) {
     return Failure(error).as(ErrorCode::kRefused).in(call.file).at_row(call.line);
   };
@@ -165,8 +162,6 @@ Result<Answers> answered_by(client::Session& session, const ModelReference& mode
   context.cell = call.cell;
   context.tool = call.tool;
   context.payload = call.payload;
-  if (call.cell != model.cell)
-    return refused("a request of cell {}, not of {}", call.cell, model.cell).in(call.file).at_row(call.line).of("cell");
   if (model.version > 0) context.model = fmt::format("@{}", model.version);
   if (!call.poses.empty()) {
     std::vector<client::CommandedJoints> poses;
@@ -204,8 +199,19 @@ std::string replayed_text(const Replayed& all, double tolerance_mm) {
       fmt::join(all.models_now, ", "));
   if (all.of_other_models > 0)
     text += fmt::format("{} of the requests were answered by another model than now\n", all.of_other_models);
+  if (!all.other_cells.empty())
+    text += fmt::format("requests of other cells were left out: {}\n", fmt::join(all.other_cells, ", "));
   for (const Different& one : all.told) text += one.what + "\n";
+  for (const DamagedLines& damaged : all.damaged)
+    text += fmt::format("{} damaged {} left out, the first: {}\n", damaged.count,
+                        damaged.count == 1 ? "line was" : "lines were", sentence(damaged.first));
   return text;
+}
+
+std::size_t damaged_lines(const Replayed& all) {
+  std::size_t count = 0;
+  for (const DamagedLines& damaged : all.damaged) count += damaged.count;
+  return count;
 }
 
 ordered_json replayed_json(const Replayed& all, double tolerance_mm) {
@@ -219,6 +225,10 @@ ordered_json replayed_json(const Replayed& all, double tolerance_mm) {
           {"tolerance_mm", tolerance_mm},
           {"largest_mm", std::isfinite(all.largest_mm) ? ordered_json(all.largest_mm) : ordered_json(nullptr)},
           {"answered_by_another_model", all.of_other_models},
+          {"other_cells", all.other_cells},
+          {"damaged_lines", damaged_lines(all)},
+          {"first_damaged",
+           all.damaged.empty() ? ordered_json(nullptr) : ordered_json(sentence(all.damaged.front().first))},
           {"largest", told}};
 }
 
@@ -226,9 +236,10 @@ ordered_json replayed_json(const Replayed& all, double tolerance_mm) {
 Result<Extent> replay_recent(const ReplayArguments& arguments) {
   if (!arguments.service.service)
     return failure(ErrorCode::kUsage, "either files of recorded requests, or --service").of("records");
-  return tell_recent_work({arguments.model, arguments.json, arguments.next_poses}, arguments.service).map([] {
-    return Extent::kAll;
-  });
+  return tell_recent_work({arguments.model, arguments.json, arguments.next_poses}, arguments.service)
+      .map([&](double differs_mm) {
+        return arguments.strict && differs_mm > arguments.tolerance_mm ? Extent::kPart : Extent::kAll;
+      });
 }
 
 Result<Extent> replay(const ReplayArguments& arguments) {
@@ -236,6 +247,7 @@ Result<Extent> replay(const ReplayArguments& arguments) {
   if (!arguments.next_poses.empty())
     return failure(ErrorCode::kUsage, "--next-poses is of what a service was lately asked, not of records")
         .of("--next-poses");
+  std::string cell;
   std::optional<CompensatedModel> here;
   std::unique_ptr<client::Session> session;
   Ask ask;
@@ -245,23 +257,31 @@ Result<Extent> replay(const ReplayArguments& arguments) {
     auto opened = open_session(arguments.service);
     if (!opened) return tl::make_unexpected(opened.error());
     session = std::move(*opened);
+    cell = model->cell;
     ask = [&session, model = *model](const RecordedCall& call) { return answered_by(*session, model, call); };
   } else {
     auto model = load_model(arguments.model);
     if (!model) return tl::make_unexpected(model.error());
     here = std::move(*model);
+    cell = here->cell().name;
     ask = [&here](const RecordedCall& call) { return answered_here(*here, call); };
   }
   Replayed all;
   for (const std::string& input : arguments.inputs) {
-    const Status done =
-        read_records(input, [&](const RecordedCall& call) { return compare(call, ask, arguments.tolerance_mm, all); });
-    if (!done) return tl::make_unexpected(done.error());
+    const auto read = read_records(input, [&](const RecordedCall& call) -> Status {
+      if (call.cell == cell) return compare(call, ask, arguments.tolerance_mm, all);
+      all.other_cells.insert(call.cell);
+      return {};
+    });
+    if (!read) return tl::make_unexpected(read.error());
+    if (read->count > 0) all.damaged.push_back(*read);
   }
+  if (all.requests == 0 && !all.other_cells.empty())
+    return refused("no request of cell {}, only of {}", cell, fmt::join(all.other_cells, ", ")).of("cell");
   tell(replayed_text(all, arguments.tolerance_mm), {arguments.json});
   if (const Status written = write_json(arguments.json, replayed_json(all, arguments.tolerance_mm)); !written)
     return tl::make_unexpected(written.error());
-  return arguments.strict && all.different > 0 ? Extent::kPart : Extent::kAll;
+  return !all.damaged.empty() || (arguments.strict && all.different > 0) ? Extent::kPart : Extent::kAll;
 }
 
 }  // namespace

@@ -78,7 +78,22 @@ RecordedCall call_of(const json& record) {
   return call;
 }
 
-Status read_file(const std::string& path, const std::function<Status(const RecordedCall&)>& take) {
+Result<RecordedCall> parse_record(const json& record) {
+  try {
+    if (record.at("record").get<int>() != 1) return refused("a record of another kind");
+    return call_of(record);
+  } catch (const json::exception&) {
+    return refused("not a request that a service has recorded");
+  }
+}
+
+/// What was read so far.
+struct ReadSoFar {
+  std::size_t requests = 0;
+  DamagedLines damaged;
+};
+
+Status read_file(const std::string& path, const std::function<Status(const RecordedCall&)>& take, ReadSoFar& read) {
   std::ifstream file(path, std::ios::binary);
   if (!file) return failure(ErrorCode::kRefused, "cannot be read").in(path);
   std::string text;
@@ -86,35 +101,42 @@ Status read_file(const std::string& path, const std::function<Status(const Recor
     const bool is_cut_off = file.eof();  // no end of line: it is being written, or the server was killed
     const json record = json::parse(text, nullptr, false);
     if (record.is_discarded() && is_cut_off) return {};
-    RecordedCall call;
-    try {
-      if (record.at("record").get<int>() != 1) return refused("a record of another kind").in(path).at_row(line);
-      call = call_of(record);
-    } catch (const json::exception&) {
-      return refused("not a request that a service has recorded").in(path).at_row(line);
+    auto call = parse_record(record);
+    if (!call) {
+      if (read.damaged.count++ == 0) read.damaged.first = Failure(call.error()).in(path).at_row(line).value();
+      continue;
     }
-    call.file = path;
-    call.line = line;
-    if (const Status taken = take(call); !taken) return taken;
+    ++read.requests;
+    call->file = path;
+    call->line = line;
+    if (const Status taken = take(*call); !taken) return taken;
   }
   return {};
 }
 
-}  // namespace
-
-Status read_records(const std::string& path, const std::function<Status(const RecordedCall&)>& take) {
+Result<std::vector<std::string>> files_of(const std::string& path) {
   std::error_code unknown;
-  if (!fs::is_directory(path, unknown)) return read_file(path, take);
+  if (!fs::is_directory(path, unknown)) return std::vector{path};
   std::vector<std::string> files;
   for (const auto& entry : fs::directory_iterator(path, unknown)) {
     if (entry.path().extension() == ".jsonl") files.push_back(entry.path().string());
   }
   std::sort(files.begin(), files.end());
   if (files.empty()) return refused("no recorded requests there").in(path);
-  for (const std::string& file : files) {
-    if (const Status read = read_file(file, take); !read) return read;
+  return files;
+}
+
+}  // namespace
+
+Result<DamagedLines> read_records(const std::string& path, const std::function<Status(const RecordedCall&)>& take) {
+  const auto files = files_of(path);
+  if (!files) return tl::make_unexpected(files.error());
+  ReadSoFar read;
+  for (const std::string& file : *files) {
+    if (const Status done = read_file(file, take, read); !done) return tl::make_unexpected(done.error());
   }
-  return {};
+  if (read.requests == 0 && read.damaged.count > 0) return tl::make_unexpected(read.damaged.first);
+  return read.damaged;
 }
 
 }  // namespace trammel::cli

@@ -36,8 +36,15 @@ struct RecordedCall {
   std::vector<RecordedTarget> targets;
 };
 
+/// Lines that are no record, as a power cut leaves them.
+struct DamagedLines {
+  std::size_t count = 0;
+  Error first;  ///< with file and line
+};
+
 /// Calls `take` for each request of the file, or of all files of the folder, in their order. A last line that was not
-/// written to its end is left out. Refuses what is no record, with file and line.
-[[nodiscard]] Status read_records(const std::string& path, const std::function<Status(const RecordedCall&)>& take);
+/// written to its end is left out. Refuses where no line is a record, with the first file and line.
+[[nodiscard]] Result<DamagedLines> read_records(const std::string& path,
+                                                const std::function<Status(const RecordedCall&)>& take);
 
 }  // namespace trammel::cli

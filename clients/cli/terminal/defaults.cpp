@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <sstream>
+#include <string_view>
 
 #include "server/base/near_miss.h"
 #include "server/base/plain_text.h"
@@ -21,6 +22,8 @@ struct Default {
   std::string name, value;
 };
 
+constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+
 std::string trimmed(const std::string& text) {
   const auto first = text.find_first_not_of(" \t\r");
   return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
@@ -30,7 +33,7 @@ Result<std::vector<Default>> read_defaults(const std::string& path) {
   const Result<std::string> text = read_text_file(path, 100'000);
   if (!text) return Failure(text.error()).as(ErrorCode::kUsage).next("TRAMMEL_DEFAULTS= takes no defaults");
   std::vector<Default> found;
-  std::istringstream lines(*text);
+  std::istringstream lines(text->starts_with(kByteOrderMark) ? text->substr(kByteOrderMark.size()) : *text);
   long row = 0;
   for (std::string line; std::getline(lines, line);) {
     ++row;

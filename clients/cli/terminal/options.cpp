@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 
 #include "server/base/plain_text.h"
 #include "server/robot/cell.h"
@@ -78,6 +79,22 @@ Result<std::unique_ptr<client::Session>> open_session(const ServiceOptions& opti
   session.domain = options.domain;
   session.timeout = std::chrono::milliseconds(static_cast<std::int64_t>(options.timeout_s * 1e3));
   return client::Session::open(session);
+}
+
+void need_finite_numbers(CLI::App& app) {
+  const CLI::Validator finite(
+      [](const std::string& text) {
+        char* end = nullptr;
+        const double value = std::strtod(text.c_str(), &end);
+        const bool is_number = !text.empty() && *end == '\0';
+        return is_number && !std::isfinite(value) ? fmt::format("{} is no number that can be used", text)
+                                                  : std::string();
+      },
+      "");
+  for (CLI::Option* option : app.get_options()) {
+    if (option->get_type_name().starts_with("FLOAT")) option->check(finite);
+  }
+  for (CLI::App* below : app.get_subcommands([](CLI::App*) { return true; })) need_finite_numbers(*below);
 }
 
 CLI::Validator above_zero() {

@@ -34,6 +34,8 @@ void add_options_of_service_command(CLI::App& command, ServiceOptions& options);
 [[nodiscard]] Result<std::vector<HostPort>> places_of(const ServiceOptions& options);
 [[nodiscard]] Result<std::unique_ptr<client::Session>> open_session(const ServiceOptions& options);
 
+/// Every option that takes a number, of the command and of those below it, refuses nan and inf.
+void need_finite_numbers(CLI::App& app);
 /// A number above 0.
 [[nodiscard]] CLI::Validator above_zero();
 /// `--seed`: a whole number from 0.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
@@ -152,6 +153,13 @@ std::string row(const std::string& part, const std::string& parameter, const cha
                      calibrated - nominal, u95);
 }
 
+/// The name, or with a number behind it where another tool has it.
+std::string unused(const std::string& name, std::set<std::string>& used) {
+  std::string one = name;
+  for (int n = 2; !used.insert(one).second; ++n) one = fmt::format("{}_{}", name, n);
+  return one;
+}
+
 std::string pose_rows(const std::string& part, const Pose& nominal, const Pose& calibrated) {
   std::string text;
   const Vector3 a = nominal.translation() * to_mm(1), b = calibrated.translation() * to_mm(1);
@@ -194,8 +202,11 @@ std::string urdf_text(const CompensatedModel& model, const RigidRobot& robot) {
     parent = child;
   }
   text += joint("flange", "fixed", parent, "flange", behind);
-  for (const auto& [name, X_FT] : robot.tools)
-    text += joint("tool_" + link_name(name), "fixed", "flange", "tool_" + link_name(name), X_FT);
+  std::set<std::string> used;
+  for (const auto& [name, X_FT] : robot.tools) {
+    const std::string link = unused("tool_" + link_name(name), used);
+    text += joint(link, "fixed", "flange", link, X_FT);
+  }
   return text + "</robot>\n";
 }
 

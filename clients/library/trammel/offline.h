@@ -27,6 +27,8 @@ class TRAMMEL_API Cell {
   [[nodiscard]] std::string robot() const;
   /// Number of joints n.
   [[nodiscard]] std::size_t joints() const;
+  /// What the joints are called in files, n names: `q1_deg`, of a rail `q1_mm`.
+  [[nodiscard]] std::vector<std::string> joint_columns() const;
   /// Ids of its tools.
   [[nodiscard]] std::vector<std::string> tools() const;
   /// Ids of its payloads.
@@ -57,6 +59,8 @@ class TRAMMEL_API Batch {
   [[nodiscard]] std::size_t size() const;
   /// Its text as it came.
   [[nodiscard]] std::string csv() const;
+  /// The same rows as a batch file of the plain kind: commas, decimal points, names in lower case, no comments.
+  [[nodiscard]] std::string table() const;
 
   /// What it is made of.
   struct Inside;

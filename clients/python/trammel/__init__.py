@@ -11,17 +11,18 @@ the robot's number of joints. Work runs without the interpreter's lock; values m
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 import io
 import json
 import os
-import re
 from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _trammel
+from .arrays import POSE, Floats, Frame, branches, floats, one_each
 from .errors import (Busy, Conflict, Internal, NotFound, Refused, TooLarge, TrammelError, Unreachable, Usage)
 
 if TYPE_CHECKING:
@@ -33,13 +34,11 @@ __all__ = [
 ]
 
 Path = Union[str, "os.PathLike[str]"]
-Floats = npt.NDArray[np.float64]
 Progress = Callable[[str, float], object]  #: told what is being done and the share done, [0, 1]; may raise to give up
 
-Table = Union[npt.ArrayLike, "pd.DataFrame"]  #: an array, or a pandas frame with the columns of a file
+_NAMES = ("pose_id", "tool_id", "payload_id", "session_id", "set", "anchor_id", "minus_pose_id")  #: columns of a batch that hold words
 
-_POSE = ("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
-_JOINT = re.compile(r"q([0-9]+)_(deg|mm)")
+Table = Union[npt.ArrayLike, "pd.DataFrame"]  #: an array, or a pandas frame with the columns of a file
 
 
 def _frame(columns: Mapping[str, Any]) -> "pd.DataFrame":
@@ -48,35 +47,34 @@ def _frame(columns: Mapping[str, Any]) -> "pd.DataFrame":
     return pandas.DataFrame(dict(columns))
 
 
-def _floats(values: Any, argument: str) -> Floats:
-    try:
-        return np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise Usage(f"{argument}: {error}") from None
-
-
-def _joint_columns(table: Any) -> List[str]:
-    """`q1_deg ... qn_deg` of a frame, by their numbers; nothing of anything else."""
-    found = [_JOINT.fullmatch(str(name)) for name in getattr(table, "columns", ())]
-    return [joint.group() for joint in sorted((j for j in found if j), key=lambda joint: int(joint.group(1)))]
-
-
-def _joints(table: Table) -> Floats:
-    columns = _joint_columns(table)
-    return _floats(table[columns] if columns else table, "joints_deg")  # type: ignore[index,call-overload]
-
-
-def _targets(pose: Optional[Table], joints_deg: Optional[Table],
-             conf: Optional[npt.ArrayLike]) -> Tuple[Optional[Floats], Optional[Floats], Optional[npt.ArrayLike]]:
-    """Poses, joints and branches as arrays; a frame of targets may hold all three."""
-    frame: Any = pose if hasattr(pose, "columns") else None
+def _asked_poses(joints_deg: Table, columns: Optional[Sequence[str]], **context: Any) -> Tuple[Any, ...]:
+    """Joints as an array, then tool, payload, directions and temperature; a frame may say them in its columns."""
+    frame = Frame.of(joints_deg, "joints_deg")
     if frame is not None:
-        if joints_deg is None and _joint_columns(frame):
-            joints_deg = frame
-        if conf is None and joints_deg is None and "conf" in frame.columns:
-            conf = frame["conf"].to_numpy()
-        pose = frame[list(_POSE)] if set(_POSE) <= set(frame.columns) else None
-    return (None if pose is None else _floats(pose, "pose"), None if joints_deg is None else _joints(joints_deg), conf)
+        context = frame.circumstances(context)
+    joints = floats(joints_deg, "joints_deg") if frame is None else frame.needed_joints(columns)
+    return (joints, *_in_order(context))
+
+
+def _asked_targets(pose: Optional[Table], joints_deg: Optional[Table], conf: Optional[npt.ArrayLike],
+                   columns: Optional[Sequence[str]], **context: Any) -> Tuple[Any, ...]:
+    """Poses, joints and branches as arrays, then the same; a frame of targets may hold all of it."""
+    targets, near = Frame.of(pose, "pose"), Frame.of(joints_deg, "joints_deg")
+    joints = None if joints_deg is None else floats(joints_deg, "joints_deg") if near is None else near.needed_joints(columns)
+    said = targets or near
+    if said is not None:
+        context = said.circumstances(context)
+    if targets is None:
+        return (None if pose is None else floats(pose, "pose"), joints, branches(conf), *_in_order(context))
+    wanted = targets.pose()
+    joints = targets.joints(columns) if joints is None else joints
+    if wanted is None and joints is None:
+        raise Usage(f"pose: neither a pose ({', '.join(POSE)}) nor joints (q1_deg ...) among its columns")
+    return (wanted, joints, targets.conf() if conf is None else branches(conf), *_in_order(context))
+
+
+def _in_order(context: Mapping[str, Any]) -> Tuple[str, str, List[int], Optional[float]]:
+    return context["tool"], context["payload"], list(context["directions"]), context["temperature_c"]
 
 
 def _column_by_column(names: Sequence[str], table: Floats) -> Dict[str, Any]:
@@ -105,7 +103,7 @@ class Predictions:
         """A pandas frame with the columns of `trammel predict`: `dx_mm ... sz_mm, in_domain`, the predicted pose."""
         return _frame({**_column_by_column(("dx_mm", "dy_mm", "dz_mm"), self.error_mm),
                        **_column_by_column(("sx_mm", "sy_mm", "sz_mm"), self.stddev_mm),
-                       "in_domain": self.in_domain, **_column_by_column(_POSE, self.predicted)})
+                       "in_domain": self.in_domain, **_column_by_column(POSE, self.predicted)})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -122,14 +120,15 @@ class Corrections:
     turn_after_deg: Floats  #: (N,): the same with it
     iterations: npt.NDArray[np.int32]  #: (N,)
     message: List[str]  #: N: why it is not ok
+    joint_columns: Optional[List[str]] = None  #: n names in files, `q1_deg` or of a rail `q1_mm`; None: of a service
 
     def __len__(self) -> int:
         return len(self.status)
 
     def frame(self) -> "pd.DataFrame":
         """A pandas frame with the columns of `trammel correct`."""
-        joints = [f"q{j + 1}_deg" for j in range(self.joints_deg.shape[1])]
-        return _frame({"status": self.status, **_column_by_column(_POSE, self.pose),
+        joints = self.joint_columns or [f"q{j + 1}_deg" for j in range(self.joints_deg.shape[1])]
+        return _frame({"status": self.status, **_column_by_column(POSE, self.pose),
                        **_column_by_column(joints, self.joints_deg), "error_before_mm": self.error_before_mm,
                        "error_after_mm": self.error_after_mm, "sigma_mm": self.sigma_mm, "message": self.message})
 
@@ -204,28 +203,28 @@ class Batch:
 
     @staticmethod
     def from_arrays(joints_deg: npt.ArrayLike, position_mm: npt.ArrayLike, name: str = "batch",
-                    orientation: Optional[npt.ArrayLike] = None, **columns: Sequence[object]) -> "Batch":
+                    orientation: Optional[npt.ArrayLike] = None, **columns: Union[Sequence[object], npt.ArrayLike]) -> "Batch":
         """From arrays: `joints_deg` (N, n) as commanded, `position_mm` (N, 3) measured in W or B, `orientation` (N, 4)
-        unit quaternions `qw, qx, qy, qz`. More columns of a batch file come by their names, N values each:
+        unit quaternions `qw, qx, qy, qz`. More columns of a batch file come by their names, N values or one for all:
         `pose_id=..., sigma_mm=..., temperature_c=..., session_id=...`. Rails (mm) need a file or a frame."""
-        joints = np.asarray(joints_deg, dtype=np.float64)
-        position = np.asarray(position_mm, dtype=np.float64)
+        joints = floats(joints_deg, "joints_deg")
+        position = floats(position_mm, "position_mm")
         if joints.ndim != 2 or position.shape != (len(joints), 3):
             raise Usage(f"joints_deg {joints.shape} and position_mm {position.shape}: (N, n) and (N, 3) are needed")
         parts = [joints, position]
         names = [f"q{j + 1}_deg" for j in range(joints.shape[1])] + ["x_mm", "y_mm", "z_mm"]
         if orientation is not None:
-            turned = np.asarray(orientation, dtype=np.float64)
+            turned = floats(orientation, "orientation")
             if turned.shape != (len(joints), 4):
                 raise Usage(f"orientation {turned.shape}: (N, 4) is needed")
             parts.append(turned)
             names += ["qw", "qx", "qy", "qz"]
+        more = [one_each(column, values, len(joints)) for column, values in columns.items()]
         text = io.StringIO()
-        text.write(",".join([*names, *columns]) + "\n")
-        rows = np.hstack(parts)
-        for i, row in enumerate(rows):
-            more = [str(values[i]) for values in columns.values()]
-            text.write(",".join([*(repr(float(value)) for value in row), *more]) + "\n")
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow([*names, *columns])
+        for i, row in enumerate(np.hstack(parts)):
+            table.writerow([*(repr(float(value)) for value in row), *(values[i] for values in more)])
         return Batch.parse(text.getvalue(), name)
 
     @staticmethod
@@ -252,14 +251,27 @@ class Batch:
         """As a pandas frame with the columns of a batch file."""
         import pandas
 
-        return pandas.read_csv(io.StringIO(self.csv()), comment="#")
+        return pandas.read_csv(io.StringIO(self._inside.table()), dtype={name: str for name in _NAMES})
 
 
 Batches = Union[Batch, Sequence[Batch]]  #: several are sessions of one arm
 
 
+def _wrong_kind(argument: str, value: object, needed: str) -> Usage:
+    return Usage(f"{argument} is of type {type(value).__name__}: {needed} is needed")
+
+
+def _inside_cell(cell: Cell) -> _trammel.Cell:
+    if not isinstance(cell, Cell):
+        raise _wrong_kind("cell", cell, "a Cell (Cell.load(path))")
+    return cell._inside
+
+
 def _inside_of(batches: Batches) -> List[_trammel.Batch]:
-    return [one._inside for one in ([batches] if isinstance(batches, Batch) else batches)]
+    several: Any = [batches] if isinstance(batches, Batch) else batches
+    if isinstance(several, str) or not hasattr(several, "__iter__") or not all(isinstance(one, Batch) for one in several):
+        raise _wrong_kind("batches", batches, "a Batch (Batch.load(path)) or a list of them")
+    return [one._inside for one in several]
 
 
 class Model:
@@ -267,6 +279,7 @@ class Model:
 
     def __init__(self, inside: _trammel.Model) -> None:
         self._inside = inside
+        self._joint_columns = inside.cell().joint_columns()
 
     @staticmethod
     def load(path: Path) -> "Model":
@@ -324,7 +337,8 @@ class Model:
         `tool`, `payload`: ids of the cell; empty: its only one. `directions`: from which each joint is approached,
         n of -1, 0, +1. Raises `Refused` with the row of a pose beyond the limits.
         """
-        return Predictions(**self._inside.predict(_joints(joints_deg), tool, payload, list(directions), temperature_c))
+        return Predictions(**self._inside.predict(*_asked_poses(
+            joints_deg, self._joint_columns, tool=tool, payload=payload, directions=directions, temperature_c=temperature_c)))
 
     def correct(self, pose: Optional[Table] = None, joints_deg: Optional[Table] = None,
                 conf: Optional[npt.ArrayLike] = None, tool: str = "", payload: str = "",
@@ -336,8 +350,9 @@ class Model:
         Without `pose` the nominal poses at `joints_deg` are wanted. `pose` may be a pandas frame with the columns of a file
         of targets: the pose, joints, `conf`. A target that cannot be corrected says so in its status.
         """
-        return Corrections(**self._inside.correct(*_targets(pose, joints_deg, conf), tool, payload, list(directions),
-                                                  temperature_c))
+        return Corrections(**self._inside.correct(*_asked_targets(
+            pose, joints_deg, conf, self._joint_columns, tool=tool, payload=payload, directions=directions,
+            temperature_c=temperature_c)), joint_columns=self._joint_columns)
 
     def __repr__(self) -> str:
         return f"<Model {self.id} of {self.facts['cell']}: {self.facts['level']}, bias {self.bias}>"
@@ -351,33 +366,35 @@ def train(cell: Cell, batches: Batches, level: Optional[str] = None, bias: Optio
           validation_share: float = 0.0, progress: Optional[Progress] = None) -> Model:
     """A model of `cell`. `level` (`M0` to `M3`, `M2,gear_transmission:3`) and `bias` (`none`, `auto`, a kernel) instead
     of what the cell file says; `validation_share` of the rows are held out where the batch has no column `set`."""
-    return Model(_trammel.train(cell._inside, _inside_of(batches), level, bias, seed, validation_share, progress))
+    return Model(_trammel.train(_inside_cell(cell), _inside_of(batches), level, bias, seed, validation_share, progress))
 
 
 def diagnose(cell: Cell, batches: Batches, seed: int = 1, progress: Optional[Progress] = None) -> Dict[str, Any]:
     """What the cell's model lacks, with the keys of `trammel diagnose --json`."""
-    found: Dict[str, Any] = json.loads(_trammel.diagnose(cell._inside, _inside_of(batches), seed, progress))
+    found: Dict[str, Any] = json.loads(_trammel.diagnose(_inside_cell(cell), _inside_of(batches), seed, progress))
     return found
 
 
 def plan(cell: Cell, count: int, seed: int = 1, criterion: str = "lhs", positions_only: bool = False) -> Plan:
     """`count` poses to measure, inside the cell's workspace and in sight of its tracker. `criterion`: `lhs`,
     `observability`, `separate:CAUSE,CAUSE`, `check`. `positions_only`: for a single reflector."""
-    return Plan(**_trammel.plan(cell._inside, count, seed, criterion, positions_only))
+    return Plan(**_trammel.plan(_inside_cell(cell), count, seed, criterion, positions_only))
 
 
 def simulate(cell: Cell, truth: Path, planned: Union[Plan, str], seed: int = 1, positions_only: bool = False,
              noise_free: bool = False) -> Batch:
     """Measures a plan (or its CSV) on a virtual robot; `truth` is a truth file: what is really wrong with the robot."""
     text = planned.csv if isinstance(planned, Plan) else planned
-    return Batch(_trammel.simulate(cell._inside, os.fspath(truth), text, seed, positions_only, noise_free))
+    return Batch(_trammel.simulate(_inside_cell(cell), os.fspath(truth), text, seed, positions_only, noise_free))
 
 
 class Session:
-    """One client of a running service, on 127.0.0.1; one per process is enough. Raises `Unreachable` where no server
-    answers within `timeout_s`."""
+    """One client of a running service, on 127.0.0.1; one per process is enough, and a forked process opens its own. Raises
+    `Unreachable` where no server answers within `timeout_s`."""
 
     def __init__(self, domain: int = 0, ports: Sequence[int] = (17500,), timeout_s: float = 5.0) -> None:
+        if not 0 < timeout_s < float("inf"):
+            raise Usage(f"timeout_s is {timeout_s}: a number of seconds above 0 is needed")
         self._inside = _trammel.Session.open(domain, list(ports), timeout_s)
 
     def status(self) -> List[Dict[str, Any]]:
@@ -395,19 +412,22 @@ class Session:
     def predict(self, cell: str, joints_deg: Table, tool: str = "", payload: str = "",
                 directions: Sequence[int] = (), temperature_c: Optional[float] = None) -> Predictions:
         """As `Model.predict()`, by the model in force: `joints_deg` (N, n) or (n,), deg, of rails mm."""
-        _, items = self._inside.predict(cell, _joints(joints_deg), tool, payload, list(directions), temperature_c)
+        _, items = self._inside.predict(cell, *_asked_poses(
+            joints_deg, None, tool=tool, payload=payload, directions=directions, temperature_c=temperature_c))
         return Predictions(**items)
 
     def correct(self, cell: str, pose: Optional[Table] = None, joints_deg: Optional[Table] = None,
                 conf: Optional[npt.ArrayLike] = None, tool: str = "", payload: str = "",
                 directions: Sequence[int] = (), temperature_c: Optional[float] = None) -> Corrections:
         """As `Model.correct()`, by the model in force: `pose` (N, 7), `joints_deg` (N, n), `conf` (N,)."""
-        _, items = self._inside.correct(cell, *_targets(pose, joints_deg, conf), tool, payload, list(directions),
-                                        temperature_c)
+        _, items = self._inside.correct(cell, *_asked_targets(
+            pose, joints_deg, conf, None, tool=tool, payload=payload, directions=directions, temperature_c=temperature_c))
         return Corrections(**items)
 
     def submit(self, cell: str, batch: Batch) -> int:
         """Hands in measurements, from which the service trains. Returns the job."""
+        if not isinstance(batch, Batch):
+            raise _wrong_kind("batch", batch, "a Batch (Batch.load(path))")
         return self._inside.submit(cell, batch.name, batch.csv())
 
     def wait_for(self, job: int, limit_s: float = 600.0) -> Dict[str, Any]:

@@ -76,14 +76,29 @@ bool make_file(const fs::path& path) {
   return file >= 0;
 }
 
+Failure not_there(const RecordOptions& options) {
+  return refused("requests cannot be recorded there")
+      .in(options.folder)
+      .of("record: folder")
+      .next("name a folder that the daemon may write to");
+}
+
 }  // namespace
+
+Status RequestRecorder::check(const RecordOptions& options) {
+  std::error_code unknown;
+  fs::path at = fs::absolute(options.folder, unknown);
+  while (!options.folder.empty() && !fs::exists(at, unknown) && at.has_relative_path()) at = at.parent_path();
+  const bool is_usable =
+      options.folder.empty() || (fs::is_directory(at, unknown) && ::access(at.c_str(), W_OK | X_OK) == 0);
+  return is_usable ? Status() : not_there(options);
+}
 
 Result<std::unique_ptr<RequestRecorder>> RequestRecorder::open(const RecordOptions& options) {
   if (options.folder.empty()) return nullptr;
   std::error_code wrong;
   fs::create_directories(options.folder, wrong);
-  if (wrong || ::access(options.folder.c_str(), W_OK | X_OK) != 0)
-    return refused("requests cannot be recorded there").in(options.folder).of("record: folder");
+  if (wrong || ::access(options.folder.c_str(), W_OK | X_OK) != 0) return not_there(options);
   std::unique_ptr<RequestRecorder> recorder(new RequestRecorder(options));
   const auto files = files_in(options.folder);
   recorder->number_ = files.empty() ? 0 : files.back().first;

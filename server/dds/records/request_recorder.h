@@ -28,6 +28,8 @@ namespace trammel {
 /// own: nobody waits for the disk. What does not fit into its queue is dropped and counted. Thread-safe.
 class RequestRecorder {
  public:
+  /// Whether open() could make its folder; makes nothing.
+  [[nodiscard]] static Status check(const RecordOptions& options);
   /// Null where nothing is to be recorded. Makes the folder; refuses one that cannot be written.
   [[nodiscard]] static Result<std::unique_ptr<RequestRecorder>> open(const RecordOptions& options);
   ~RequestRecorder();  ///< writes what waits

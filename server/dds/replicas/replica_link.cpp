@@ -14,7 +14,9 @@ constexpr std::chrono::milliseconds kDivergent{3000};  // of two that are in ste
 constexpr std::chrono::seconds kCatchUpAgain{5};       // with a follower that did not say it has a batch
 constexpr std::chrono::seconds kModelComes{10};        // after it was told of
 constexpr std::size_t kCopiesRemembered = 100'000;
-constexpr std::size_t kCopiesAtOnce = 64;  // that may wait to be stored; the writer sends them again
+// That may wait to be stored: the writer sends the others again. One is taken however large it is.
+constexpr std::size_t kCopiesAtOnce = 64;
+constexpr std::size_t kCopiedBytesAtOnce = 64'000'000;
 
 template <typename State>
 Result<wire::dds::DataWriter*> make_writer(wire::dds::DomainParticipant& participant, wire::dds::Publisher& publisher,
@@ -102,13 +104,14 @@ Status ReplicaLink::open_endpoints(wire::dds::DomainParticipant& participant, wi
   copy_reader_ = std::move(*copies);
   auto answers = wire::StateReader<wire::BatchCopiedTopic>::open(
       topic_of(copied_writer_), subscriber_, wire::call_reader_qos(wire::kRequestDepth),
-      [this](const wire::BatchCopied* sample, const std::string&, double) { on_copied(sample); });
+      [this](const wire::BatchCopied* sample, const std::string& from, double) { on_copied(sample, from); });
   if (!answers) return tl::make_unexpected(answers.error());
   copied_reader_ = std::move(*answers);
   return {};
 }
 
 Status ReplicaLink::listen_to_snapshots() {
+  const MutexLock lock(listening_);
   auto models = wire::StateReader<wire::ModelSnapshotTopic>::open(
       Result<wire::dds::Topic*>(snapshots_topic_), subscriber_, wire::state_reader_qos(),
       [this](const wire::ModelSnapshot* sample, const std::string&, double) { on_snapshot(sample); });
@@ -170,17 +173,30 @@ void ReplicaLink::on_copy(const wire::BatchCopy* copy, const std::string& partic
   if (copy == nullptr || copy->to().to_string() != server_) return;
   {
     const MutexLock lock(mutex_);
-    const auto from = heard_.find(copy->server().to_string());
-    const bool is_its_own = from != heard_.end() && from->second.participant == participant;
-    if (!is_its_own || arrived_.size() >= kCopiesAtOnce) return;
+    if (!is_its_own(copy->server().to_string(), participant) || !has_room_for(*copy)) return;
     woken_ = true;
     arrived_.push_back(*copy);
   }
   changed_.notify_all();
 }
 
-void ReplicaLink::on_copied(const wire::BatchCopied* copied) {
+bool ReplicaLink::is_its_own(const std::string& server, const std::string& participant) const {
+  const auto heard = heard_.find(server);
+  return heard != heard_.end() && heard->second.participant == participant;
+}
+
+bool ReplicaLink::has_room_for(const wire::BatchCopy& copy) const {
+  std::size_t bytes = copy.csv().size();
+  for (const wire::BatchCopy& waiting : arrived_) bytes += waiting.csv().size();
+  return arrived_.empty() || (arrived_.size() < kCopiesAtOnce && bytes <= kCopiedBytesAtOnce);
+}
+
+void ReplicaLink::on_copied(const wire::BatchCopied* copied, const std::string& participant) {
   if (copied == nullptr || copied->to().to_string() != server_) return;
+  {
+    const MutexLock lock(mutex_);
+    if (!is_its_own(copied->server().to_string(), participant)) return;
+  }
   const Status outcome =
       copied->result() == wire::RESULT_OK ? Status() : Status(failure(ErrorCode::kRefused, "{}", copied->why()));
   copies_.answered(copied->server().to_string(), copied->number(), outcome);
@@ -300,7 +316,8 @@ void ReplicaLink::follow(const OtherReplica& leader, const ReplicaView& view) {
   bool has_all = true;
   for (const auto& [cell, wanted] : leader.cells) {
     const auto present = view.cells.find(cell);
-    if (present != view.cells.end() && present->second.hash == wanted.hash) continue;
+    const bool is_in_force = present != view.cells.end() && present->second.hash == wanted.hash;
+    if (is_in_force && trainer_.serves(cell, wanted.hash)) continue;
     if (const Status followed = follow_cell(cell, wanted, leader.server); followed) continue;
     has_all = false;
     const std::string why = why_not_followed(cell, wanted);
@@ -323,8 +340,9 @@ Status ReplicaLink::follow_cell(const std::string& cell, const VersionInForce& w
     return tl::make_unexpected(before->second.second);
   const auto stored = store_.has_model(cell, wanted.hash);
   if (!stored) return tl::make_unexpected(stored.error());
+  const bool is_stored = *stored && !not_loaded_.contains(wanted.hash);
   std::string text;
-  if (!*stored) {
+  if (!is_stored) {
     const MutexLock lock(mutex_);
     const auto snapshot = snapshots_.find({leader, cell});
     if (snapshot == snapshots_.end() || snapshot->second.hash != wanted.hash)
@@ -336,10 +354,18 @@ Status ReplicaLink::follow_cell(const std::string& cell, const VersionInForce& w
   const auto adopted = trainer_.adopt(cell, wanted, text, by);
   if (adopted) {
     not_followed_.erase(cell);
+    not_loaded_.erase(wanted.hash);
     return {};
   }
+  if (is_stored && adopted.error().code != ErrorCode::kBusy) return ask_again_for(wanted.hash);
   if (adopted.error().code != ErrorCode::kBusy) not_followed_[cell] = {wanted.hash, adopted.error()};
   return tl::make_unexpected(adopted.error());
+}
+
+Status ReplicaLink::ask_again_for(const std::string& hash) {
+  not_loaded_.insert(hash);
+  if (const Status listens = listen_to_snapshots(); !listens) return listens;
+  return failure(ErrorCode::kBusy, "what is stored of it cannot be loaded, and it has not come again yet");
 }
 
 std::string ReplicaLink::why_not_followed(const std::string& cell, const VersionInForce& wanted) {
@@ -355,7 +381,9 @@ void ReplicaLink::forget_known_snapshots() {
     const MutexLock lock(mutex_);
     for (const auto& [of, snapshot] : snapshots_) known.emplace_back(of.second, snapshot.hash);
   }
-  std::erase_if(known, [&](const auto& one) { return !store_.has_model(one.first, one.second).value_or(false); });
+  std::erase_if(known, [&](const auto& one) {
+    return not_loaded_.contains(one.second) || !store_.has_model(one.first, one.second).value_or(false);
+  });
   const MutexLock lock(mutex_);
   std::erase_if(snapshots_, [&](const auto& entry) {
     return std::find(known.begin(), known.end(), std::pair(entry.first.second, entry.second.hash)) != known.end();

@@ -74,6 +74,10 @@ class ReplicaLink {
   [[nodiscard]] Status open_endpoints(wire::dds::DomainParticipant& participant, wire::dds::Topic& snapshots);
   /// What was published before comes once more.
   [[nodiscard]] Status listen_to_snapshots();
+  /// Whether the participant is the server's: no other one speaks for it.
+  [[nodiscard]] bool is_its_own(const std::string& server, const std::string& participant) const
+      TRAMMEL_REQUIRES(mutex_);
+  [[nodiscard]] bool has_room_for(const wire::BatchCopy& copy) const TRAMMEL_REQUIRES(mutex_);
   /// False: the store does not let the part be remembered yet.
   [[nodiscard]] bool begin();
 
@@ -81,7 +85,7 @@ class ReplicaLink {
   void on_status(const wire::ReplicaStatus* status, const std::string& participant);
   void on_snapshot(const wire::ModelSnapshot* snapshot);
   void on_copy(const wire::BatchCopy* copy, const std::string& participant);
-  void on_copied(const wire::BatchCopied* copied);
+  void on_copied(const wire::BatchCopied* copied, const std::string& participant);
   void wake();
 
   // In the thread of the replicas.
@@ -94,6 +98,8 @@ class ReplicaLink {
   /// Puts in force what the leader has; returns what could not be, by cell.
   void follow(const OtherReplica& leader, const ReplicaView& view);
   [[nodiscard]] Status follow_cell(const std::string& cell, const VersionInForce& wanted, const std::string& leader);
+  /// Of a stored model that cannot be loaded: its writer's snapshot replaces it. Returns why it is not served yet.
+  [[nodiscard]] Status ask_again_for(const std::string& hash);
   /// Empty: it may still come.
   [[nodiscard]] std::string why_not_followed(const std::string& cell, const VersionInForce& wanted);
   /// Forgets snapshots of models that are stored here.
@@ -131,6 +137,7 @@ class ReplicaLink {
   BatchCopies copies_;
   std::atomic<std::uint64_t> epoch_{0};
 
+  Mutex listening_;  // while the reader of snapshots is made anew
   mutable Mutex mutex_;
   mutable Condition changed_;
   bool woken_ TRAMMEL_GUARDED_BY(mutex_) = false;
@@ -152,6 +159,7 @@ class ReplicaLink {
   // Of the thread of the replicas.
   bool begun_ = false;
   std::map<std::string, std::pair<std::string, Error>> not_followed_;  // by cell: the hash, and why
+  std::set<std::string> not_loaded_;                                   // hashes of stored models that are damaged
   std::map<std::string, Clock::time_point> awaited_since_;             // models, by cell and hash
   std::optional<ReplicaNews> new_part_;                                // not told yet
   std::map<std::string, Clock::time_point> divergent_since_;           // by server and cell
