@@ -8,7 +8,6 @@
 #include "server/base/text_file.h"
 #include "server/dds/dds_service.h"
 #include "server/dds/port_lock.h"
-#include "server/dds/records/request_recorder.h"
 #include "server/http/http_server.h"
 #include "server/store/store_check.h"
 #include "server/trainer/dark_cells.h"
@@ -77,7 +76,7 @@ StartCheck check_start(const ServerReading& server, const std::string& path) {
   if (!config.log.file.empty()) {
     if (const Status log = check_writable(config.log.file); !log) wrong("log: file", log.error());
   }
-  if (const Status folder = RequestRecorder::check(config.dds.record); !folder) wrong("record: folder", folder.error());
+  if (const Status folder = check_records(config.dds.record); !folder) wrong("record: folder", folder.error());
   std::error_code error;
   const bool is_there = store || store_held;
   if (is_there && std::filesystem::exists(config.store, error)) look_at_cells(config, check);

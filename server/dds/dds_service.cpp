@@ -410,6 +410,8 @@ Status check_security(const std::string& folder) {
   return security_of(folder).map([](const auto&) {});
 }
 
+Status check_records(const RecordOptions& options) { return RequestRecorder::check(options); }
+
 DdsService::DdsService(DdsOptions options, Trainer& trainer, Store& store, const ModelRegistry& registry)
     : options_(std::move(options)), trainer_(trainer), store_(store), registry_(registry) {}
 

@@ -18,6 +18,8 @@ namespace trammel {
 
 /// What start() would refuse in the folder of certificates and permissions (idl/security.h); nothing where it is empty.
 [[nodiscard]] Status check_security(const std::string& folder);
+/// Whether requests can be recorded there; makes nothing.
+[[nodiscard]] Status check_records(const RecordOptions& options);
 
 /// The service on DDS: answers the requests of idl/ and publishes the state topics. Owns the threads that work on
 /// requests (schedule/lane.h: DdsOptions::compute_workers for each of PredictError and CorrectTarget, some for what

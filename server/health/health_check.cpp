@@ -122,6 +122,8 @@ class Examination {
   void look_back();
   /// The cause that explains most for its price; empty: none explains anything.
   [[nodiscard]] std::optional<std::size_t> likeliest(const CheckTests& tests, const Eigen::VectorXd& left) const;
+  /// The same, though its size may be far beyond what these poses show.
+  [[nodiscard]] std::size_t most_explained(const CheckTests& tests, const Eigen::VectorXd& left) const;
   /// Refitted besides: all that were named but the one at `k`.
   [[nodiscard]] CheckTests beside_others(std::size_t k) const;
   void refit_named();
@@ -212,14 +214,23 @@ bool Examination::look_once(const CheckTests& tests) {
     is_too_far_ = true;
     return false;
   }
-  const bool fits = best && tests.p_value(*best, left) < kNearlySeen * limit;
+  const auto is_seen = [&](std::size_t cause) { return tests.p_value(cause, left) < kNearlySeen * limit; };
+  const bool fits = best && is_seen(*best);
   if (fits) {
     named_.push_back({*best, chance});
     refit_named();
-  } else if (named_.empty() && tests.whole_p(left) < limit) {
+  } else if (named_.empty() &&
+             (tests.whole_p(left) < limit || (questions_.causes > 0 && is_seen(most_explained(tests, left))))) {
     unknown_found(chance, left, tests.rows().freedom());
   }
   return fits;
+}
+
+std::size_t Examination::most_explained(const CheckTests& tests, const Eigen::VectorXd& left) const {
+  const std::vector<double> scores = tests.scores(left);
+  return static_cast<std::size_t>(
+      std::max_element(scores.begin(), scores.begin() + static_cast<std::ptrdiff_t>(questions_.causes)) -
+      scores.begin());
 }
 
 std::optional<std::size_t> Examination::likeliest(const CheckTests& tests, const Eigen::VectorXd& left) const {

@@ -50,7 +50,7 @@ std::optional<PoseContext> context_of(const ModelParts& parts, std::size_t i, co
 }
 
 ShownPoses poses_learned(const CompensatedModel& model, const BiasModel& bias) {
-  ShownPoses shown{"training poses, each left out of the bias", {}};
+  ShownPoses shown{"training poses, counted without those held out, each left out of the bias", {}};
   const ModelParts& parts = model.parts();
   const BiasState& state = bias.state();
   const Eigen::MatrixXd left = state.residual_B - bias.leave_one_out_mean_B();

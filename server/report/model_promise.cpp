@@ -31,8 +31,9 @@ std::int64_t newest_measurement(const ModelProvenance& provenance) {
 
 std::string check_by(const ModelProvenance& provenance) {
   const std::int64_t from = newest_measurement(provenance);
-  return from > 0 ? "check again by " + shown_day(from + kFirstCheck * kDay)
-                  : "when it was measured is not known, so check before use";
+  if (from <= 0) return "when it was measured is not known, so check before use";
+  const std::int64_t due = from + kFirstCheck * kDay;
+  return fmt::format("check again by {}{}", shown_day(due), unix_now() > due ? ", a day that has passed" : "");
 }
 
 /// Where the day of the next check has passed.

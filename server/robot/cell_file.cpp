@@ -434,17 +434,27 @@ Result<std::string> file_text_of(const std::string& path) {
   return read_text_file(path);
 }
 
-/// The text of the robot file that the cell names. Its path is relative to the cell file.
+/// Of the robot file that the cell names: relative to the cell file.
+Result<std::string> robot_path_in(const std::string& cell_yaml, const std::string& path) {
+  return read_yaml(cell_yaml, path, [](const YamlMap& map) { return map.text("robot"); })
+      .map([&](const std::string& name) { return (std::filesystem::path(path).parent_path() / name).string(); });
+}
+
+/// The text of the robot file that the cell names.
 Result<std::string> robot_text_of(const std::string& cell_yaml, const std::string& path, std::string& robot_path) {
-  const Result<std::string> name = read_yaml(cell_yaml, path, [](const YamlMap& map) { return map.text("robot"); });
-  if (!name) return tl::make_unexpected(name.error());
-  robot_path = (std::filesystem::path(path).parent_path() / *name).string();
+  const Result<std::string> found = robot_path_in(cell_yaml, path);
+  if (!found) return tl::make_unexpected(found.error());
+  robot_path = *found;
   return file_text_of(robot_path).map_error([&](Error error) {
     return Failure(std::move(error)).of("robot").next(fmt::format("{} names it as its robot", path)).value();
   });
 }
 
 }  // namespace
+
+Result<std::string> robot_path_of(const std::string& path) {
+  return file_text_of(path).and_then([&](const std::string& text) { return robot_path_in(text, path); });
+}
 
 std::optional<long> row_of_model_key(const Cell& cell, const std::string& key) {
   const auto row = read_yaml(cell.cell_yaml, cell.name, [&](const YamlMap& map) {

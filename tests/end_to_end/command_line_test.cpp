@@ -563,6 +563,19 @@ TEST_F(CommandLine, AFailedTrainingLeavesTheOldModelAsItWas) {
   EXPECT_EQ(test::read_file(model), before);
 }
 
+TEST_F(CommandLine, NoOutputOverwritesTheRobotFileThatTheCellNames) {
+  const std::string robot =
+      folder_.write("arm.yaml", test::read_file(TRAMMEL_SOURCE_DIR "/models/abb_irb6640-205-275.yaml"));
+  std::string text = test::read_file(cell_);
+  const std::size_t at = text.find("robot: "), end = text.find('\n', at);
+  const std::string cell = folder_.write("cell.yaml", text.replace(at, end - at, "robot: arm.yaml"));
+  const std::string before = test::read_file(robot);
+  const Finished finished = trammel({"plan", "--cell", cell, "--count", "20", "-o", robot});
+  EXPECT_EQ(finished.exit_code, kWrongUsage) << finished.err;
+  EXPECT_NE(finished.err.find("would overwrite the robot file"), std::string::npos) << finished.err;
+  EXPECT_EQ(test::read_file(robot), before);
+}
+
 TEST_F(CommandLine, TheReportIsOnePageWithItsChartsInside) {
   const std::string batch = measure("b", 30, 1);
   must({"report", "--model", train(batch, "M2"), "--batch", batch, "-o", file("r.html")});

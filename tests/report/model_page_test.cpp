@@ -165,7 +165,7 @@ TEST_F(ModelPage, BeginsWithHowGoodItIsWhereAndUntilWhen) {
   const auto accuracy = PositionAccuracy::of(model);
   const std::string promise = promise_sentence(model, accuracy);
   EXPECT_EQ(promise, fmt::format("Good to {} mm at 95 % in this volume, by its training poses alone; not known beyond; "
-                                 "check again by 2025-12-24.",
+                                 "check again by 2025-12-24, a day that has passed.",
                                  rounded_up_mm(accuracy->at(0.95))));
   const std::string page = model_page(model, std::nullopt);
   EXPECT_TRUE(has(page, "<p id=\"promise\">" + promise));

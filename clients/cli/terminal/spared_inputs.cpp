@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "server/robot/cell_file.h"
+
 namespace trammel::cli {
 
 namespace {
@@ -39,10 +41,21 @@ std::vector<Given> files_given(const CLI::App& command, bool outputs) {
   return files;
 }
 
+/// The robot files that cell files name.
+std::vector<Given> robots_of(const std::vector<Given>& inputs) {
+  std::vector<Given> robots;
+  for (const Given& input : inputs) {
+    if (input.option != "--cell") continue;
+    if (const auto path = robot_path_of(input.path)) robots.push_back({"the robot file of --cell", *path});
+  }
+  return robots;
+}
+
 }  // namespace
 
 Status check_inputs_are_spared(const CLI::App& command) {
-  const std::vector<Given> inputs = files_given(command, false);
+  std::vector<Given> inputs = files_given(command, false);
+  for (Given& robot : robots_of(inputs)) inputs.push_back(std::move(robot));
   for (const Given& output : files_given(command, true)) {
     for (const Given& input : inputs) {
       std::error_code error;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "server/robot/rigid_fit.h"
 
@@ -11,7 +12,9 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kShared = 0.2;    // of a joint's range: poses nearer than that share what the model leaves over
+constexpr double kShared = 0.2;  // of a joint's range: poses nearer than that share what the model leaves over
+constexpr double kOfJoints =
+    0.5;  // of the variance that a model leaves over: as errors of joints, the rest in any direction
 constexpr double kFarOff = 6;      // times the median: a pose that does not say where the base stands
 constexpr int kLocalisations = 4;  // without the poses that were far off the last time
 constexpr double kJitter = 1e-6;   // of the instrument's variance: what is certain is so to rounding
@@ -110,6 +113,37 @@ Eigen::MatrixXd covariance_of(const CheckRows& rows, const RowDeviations& deviat
   return 0.5 * (S + S.transpose());
 }
 
+/// What the model leaves over as an error of each joint's own angle by any function of it, all joints alike and
+/// together as large as what is left over: R x R. Gears that the model does not know look like that, and not alike in
+/// all axes.
+Eigen::MatrixXd left_in_joints(const CheckRows& rows, const RowDeviations& deviations, const CauseEffects& effects,
+                               const JointVector& range) {
+  const Index R = rows.residual.size();
+  std::map<int, Index> columns;  // by joint
+  for (const CauseEffects::Entry& entry : effects.causes())
+    if (entry.cause.any_function) columns[entry.cause.joint] = entry.columns.front();
+  const auto power = [&](const Eigen::VectorXd& of) {
+    double sum = 0;
+    for (const Index first : rows.first) sum += of.segment<3>(first).squaredNorm();
+    return sum;
+  };
+  Eigen::MatrixXd S = Eigen::MatrixXd::Zero(R, R);
+  for (const auto& [joint, column] : columns) {
+    Eigen::VectorXd moved = rows.by_cause.col(column);
+    if (!(power(moved) > 0)) continue;
+    moved *= std::sqrt(power(deviations.left) / power(moved) / static_cast<double>(columns.size()));
+    for (std::size_t i = 0; i < rows.poses(); ++i) {
+      for (std::size_t k = 0; k < rows.poses(); ++k) {
+        const double apart = (rows.contexts[i].q(joint) - rows.contexts[k].q(joint)) / (kShared * range(joint) + 1e-9);
+        S.block(rows.first[i], rows.first[k], rows.count[i], rows.count[k]) +=
+            std::exp(-0.5 * apart * apart) * moved.segment(rows.first[i], rows.count[i]) *
+            moved.segment(rows.first[k], rows.count[k]).transpose();
+      }
+    }
+  }
+  return S;
+}
+
 /// The model's held-out poses say how large its errors really are.
 double held_out_factor(const CheckRows& rows, const ModelParts& parts) {
   if (!parts.validation || parts.validation->poses == 0) return 1;
@@ -173,7 +207,8 @@ Result<CheckRows> check_rows(const CompensatedModel& model, const MeasurementBat
     deviations.J.middleRows<3>(first + 3) = R_BW * J_W.bottomRows<3>();
     add_rotation(tracker.sigma_rotation, shown, parts.covariance, first + 3, deviations);
   }
-  rows.covariance = covariance_of(rows, deviations, parts);
+  rows.covariance =
+      covariance_of(rows, deviations, parts) + left_in_joints(rows, deviations, effects, parts.q_max - parts.q_min);
   const double factor = held_out_factor(rows, parts);
   rows.covariance *= factor * factor;
   return rows;
