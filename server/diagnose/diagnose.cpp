@@ -127,11 +127,34 @@ Status run(const std::vector<Step>& steps, const DiagnoseOptions& options) {
   return {};
 }
 
+/// Causes that a training adds by itself, and that the search cannot see: without any payload the gears that give way
+/// do nothing until the links weigh something. Their own effect is no evidence of another cause.
+std::vector<const CauseRecord*> added_unseen(const std::shared_ptr<const Cell>& cell,
+                                             const std::vector<std::string>& sources, const MeasurementBatch& batch) {
+  const auto& payloads = cell->payloads;
+  if (std::any_of(payloads.begin(), payloads.end(), [](const auto& one) { return one.second.mass > 0; })) return {};
+  const Result<CalibrationResult> trained = calibrate(cell, sources, batch, {.held = {}, .weigh_links = true});
+  std::vector<const CauseRecord*> added;
+  for (std::size_t s = 0; trained && s < trained->model.sources.size(); ++s) {
+    const CauseRecord& cause = trained->model.sources[s]->cause();
+    const bool is_listed = std::find(sources.begin(), sources.end(), cause.spelling) != sources.end();
+    if (cause.added_by_data && !cause.needs.temperature && !is_listed) added.push_back(&cause);
+  }
+  return added;
+}
+
 Result<SearchResult> searched(const std::shared_ptr<const Cell>& cell, const PreparedBatch& prepared,
-                              const Placed& placed, const DiagnoseOptions& options) {
+                              const Placed& placed, const DiagnoseOptions& options, Diagnosis& diagnosis) {
   const Status wanted = report_progress(options, "calibrating", 0);
   if (!wanted) return tl::make_unexpected(wanted.error());
-  Result<SearchResult> result = search_causes(cell, sources_of(*cell, placed), prepared.train, options);
+  std::vector<std::string> sources = sources_of(*cell, placed);
+  for (const CauseRecord* cause : added_unseen(cell, sources, prepared.train)) {
+    sources.emplace_back(cause->spelling);
+    diagnosis.limits.push_back(
+        fmt::format("{} ({}): in no file, found from these poses as training finds it, and no finding here",
+                    in_words(std::string(cause->spelling)), cause->spelling));
+  }
+  Result<SearchResult> result = search_causes(cell, sources, prepared.train, options);
   if (!result) return result;
   const Status go_on = report_progress(options, "measuring the gain", 0.65);
   if (!go_on) return tl::make_unexpected(go_on.error());
@@ -184,13 +207,13 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
   if (!together) return tl::make_unexpected(together.error());
   const Result<PreparedBatch> prepared = prepare(*cell, batch, together->sessions());
   if (!prepared) return tl::make_unexpected(prepared.error());
-  Result<SearchResult> result = searched(cell, *prepared, *together, options);
+  Diagnosis diagnosis;
+  Result<SearchResult> result = searched(cell, *prepared, *together, options, diagnosis);
   if (!result) return tl::make_unexpected(result.error());
   const Explained explained(*cell, std::move(*result));
   const SearchResult& found = explained.found;
   const std::vector<FamilyPtr> families = make_families(explained.after);
 
-  Diagnosis diagnosis;
   diagnosis.batch = as_recorded(prepared->surrogates, found.batch);
   tell_provenance(*cell, batch, options.seed, diagnosis);
   tell_errors(explained, *prepared, diagnosis);

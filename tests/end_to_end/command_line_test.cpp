@@ -309,6 +309,10 @@ TEST_F(CommandLine, TrainFindsTheLoadThatComplianceActsOnWhereNoMassIsTold) {
             changed(measure("v", 200, 5), "payload_id", [](auto, const auto&) { return ""; }), "--json", "-"})
           .out);
   EXPECT_LT(fresh["levels"]["calibrated"]["rms_mm"].get<double>(), 0.03) << "of 3.8 mm that the load bends the arm";
+  const json found = json::parse(must({"diagnose", "--cell", unloaded, "--batch", batch, "--json", "-"}).out);
+  EXPECT_EQ(found["verdict"], "nothing") << found["sentence"];
+  EXPECT_LT(found["before"]["rms_mm"].get<double>(), 0.05) << "what the links weigh is not left over";
+  EXPECT_NE(found["limits"].dump().find("self_weight"), std::string::npos) << found["limits"];
 }
 
 TEST_F(CommandLine, FromPlanToEvaluationOnFilesAlone) {
