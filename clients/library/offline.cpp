@@ -9,6 +9,7 @@
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
+#include "server/compensate/known_rows.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
 #include "server/compensate/model_spec.h"
@@ -112,7 +113,8 @@ Evaluation evaluation_of(const trammel::Evaluation& e) {
                  figures_from(e.compensated),
                  {},
                  {},
-                 doubt_of_bias(e).value_or("")};
+                 doubt_of_bias(e).value_or(""),
+                 0};
   if (e.nlpd) out.nlpd = nlpd_in_mm(*e.nlpd);
   if (const auto& o = e.orientation) {
     out.orientation =
@@ -329,7 +331,11 @@ Result<Evaluation> Model::evaluate(std::span<const Batch> batches) const {
   if (!positions) return passed_on(positions);
   const auto world = in_world_of(inside_->model, batch->rows());
   if (!world) return passed_on(world);
-  return evaluation_of(inside_->model.evaluate(world->batch));
+  Evaluation told = evaluation_of(inside_->model.evaluate(world->batch));
+  const LearnedFrom learned(inside_->model, batch->hash());
+  const auto& rows = world->batch.measurements;
+  told.trained_on = static_cast<int>(std::count_if(rows.begin(), rows.end(), learned));
+  return told;
 }
 
 Result<Model> train(const Cell& cell, std::span<const Batch> batches, const TrainOptions& options) {

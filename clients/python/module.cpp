@@ -211,6 +211,7 @@ py::dict to_python(const api::Evaluation& e) {
   if (e.nlpd) out["nlpd"] = *e.nlpd;
   if (e.orientation) out["orientation"] = to_python(*e.orientation);
   if (!e.doubt_of_bias.empty()) out["doubt_of_bias"] = e.doubt_of_bias;
+  if (e.trained_on > 0) out["trained_on"] = e.trained_on;
   return out;
 }
 

@@ -12,10 +12,11 @@ namespace trammel {
 
 namespace {
 
-constexpr double kNothing = 1e-9;    // m, rad: a parameter whose prior moves the tool by less has no effect
-constexpr double kElsewhere = 1e-3;  // m: a tool that moved by more turns through other errors of the arm
-constexpr double kSameRms = 1e-9;    // relative
-constexpr int kAskedPoses = 5;       // enough that each source acts at one of them
+constexpr double kNothing = 1e-9;      // m, rad: a parameter whose prior moves the tool by less has no effect
+constexpr double kFarFromDrawing = 5;  // standard deviations of the prior
+constexpr double kElsewhere = 1e-3;    // m: a tool that moved by more turns through other errors of the arm
+constexpr double kSameRms = 1e-9;      // relative
+constexpr int kAskedPoses = 5;         // enough that each source acts at one of them
 constexpr const char* kAsWithout = "so the model is what it would be without it";
 constexpr int kAfterEverything = 1 << 20;  // index of a pose after any batch: all that begins at a pose has begun
 
@@ -121,6 +122,29 @@ void add_idle_sources(const CompensatedModel::Parts& parts, std::vector<std::str
   }
 }
 
+/// What no arm is off its drawing by: something else than the arm is not as the files have it.
+void add_far_parameters(const CompensatedModel::Parts& parts, std::vector<std::string>& notes) {
+  std::string far;
+  std::size_t first = 0;
+  for (const ErrorSourcePtr& source : parts.physics.sources) {
+    const std::size_t count = source->parameters().size();
+    for (std::size_t i = first; i < first + count && source->cause().scope == causes::Scope::kArm; ++i) {
+      const IdentifiedParameter& one = parts.parameters[i];
+      const Parameter& parameter = one.parameter;
+      if (!one.identified || std::abs(one.value - parameter.prior) < kFarFromDrawing * parameter.prior_scale) continue;
+      far += fmt::format("{}{} {:.4g} {}", far.empty() ? "" : ", ", parameter.name, parameter.scale * one.value,
+                         parameter.unit);
+    }
+    first += count;
+  }
+  if (far.empty()) return;
+  notes.push_back(
+      fmt::format("no arm is usually so far from its drawing: {}; is it this robot's file, and is the tool in the cell "
+                  "file the one "
+                  "that was measured (null in its place finds it)?",
+                  far));
+}
+
 void add_moved_tools(const CompensatedModel& model, std::vector<std::string>& notes) {
   const CompensatedModel::Parts& parts = model.parts();
   if (!parts.bias_origin) return;
@@ -186,6 +210,7 @@ std::vector<std::string> notes_of(const CompensatedModel& model) {
   add_sessions(model.parts(), notes);
   add_what_data_added(model.parts(), notes);
   add_idle_sources(model.parts(), notes);
+  add_far_parameters(model.parts(), notes);
   add_moved_tools(model, notes);
   return notes;
 }

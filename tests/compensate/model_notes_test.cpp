@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 
@@ -49,6 +51,21 @@ TEST(ModelNotes, EverySourceThatHasNothingToActOnIsNamed) {
   EXPECT_TRUE(
       stiff.front().starts_with("payload mass or centre of gravity does nothing here: nothing gives way under a load"))
       << stiff[0];
+}
+
+TEST(ModelNotes, LengthsThatNoArmIsOffItsDrawingByAskForTheTool) {
+  CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
+  const auto a6 = std::find_if(parts.parameters.begin(), parts.parameters.end(),
+                               [](const auto& one) { return one.parameter.name == "a6"; });
+  ASSERT_NE(a6, parts.parameters.end());
+  a6->value = 4 * a6->parameter.prior_scale;
+  EXPECT_TRUE(notes_of(test::demand(CompensatedModel::make(parts))).empty());
+  a6->value = -10e-3;
+  const std::vector<std::string> notes = notes_of(test::demand(CompensatedModel::make(parts)));
+  ASSERT_EQ(notes.size(), 1U);
+  EXPECT_TRUE(notes.front().starts_with("no arm is usually so far from its drawing: a6 -10 mm; is it")) << notes[0];
+  a6->identified = false;
+  EXPECT_TRUE(notes_of(test::demand(CompensatedModel::make(parts))).empty());
 }
 
 TEST(ModelNotes, ASourceThatActsIsNot) {

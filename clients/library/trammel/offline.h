@@ -103,6 +103,7 @@ struct Evaluation {
   std::optional<double> nlpd;                    ///< mean negative log predictive density, nat, positions in mm
   std::optional<OrientationErrors> orientation;  ///< where orientations were measured
   std::string doubt_of_bias;                     ///< where the bias does not help, a sentence; else empty
+  int trained_on = 0;  ///< of the poses, those that the model was trained on: they say how well it fits
 };
 
 /// One identified parameter of a model.
