@@ -30,7 +30,7 @@ constexpr std::size_t kFewestPoses = 40;             // to look at
 constexpr std::size_t kFewestBeyond = 6;             // poses before a jump, and from it on
 constexpr double kLeastSeen = 1;       // information of a candidate, prior units: below it the poses do not show it
 constexpr double kUsuallyLeft = 1e-3;  // m, of a model: where it leaves more, what jumped may be as much larger
-constexpr double kLittle = 1e-3;       // of the poses' information: a prior that hardly shrinks a size
+constexpr double kLittle = 1e-6;       // of the poses' information: a prior that hardly shrinks a size
 constexpr double kWholeBatch = 1;      // of its length: lags of what grows slowly
 constexpr double kLags[] = {0.05, 0.1, 0.2, 0.4, kWholeBatch};
 constexpr Index kWaves = 16;              // half waves over the batch, of which a wandering course is made
@@ -189,7 +189,7 @@ class JumpSearch {
     const MatrixXd shared = sums.shared.middleRows(first, count);
     MatrixXd left = sums.own.block(first, first, count, count) - shared * factor_.solve(shared.transpose());
     if (left.trace() < kLeastSeen * prior_) return {};
-    left.diagonal().array() += std::min(prior_, most_prior * left.trace() / static_cast<double>(count));
+    left.diagonal() += (most_prior * left.diagonal()).cwiseMax(kLittle * prior_).cwiseMin(prior_).eval();
     const VectorXd along = sums.along.segment(first, count) - shared * at_rest_;
     const VectorXd size = left.ldlt().solve(along);
     return {along.dot(size), size};

@@ -9,6 +9,7 @@
 #include "server/calibrate/calibrate.h"
 #include "server/calibrate/frames/frames.h"
 #include "server/calibrate/identify_sessions.h"
+#include "server/calibrate/jump.h"
 #include "server/calibrate/one_session.h"
 #include "server/diagnose/families/candidates.h"
 #include "server/diagnose/search/search.h"
@@ -194,6 +195,19 @@ std::string told_of_sessions(const Diagnosis& diagnosis) {
   return text;
 }
 
+/// What began in the middle of the batch, where nothing known explains it: too large for the search, whose effects are
+/// held against what is left.
+std::string told_of_jump(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+                         const Diagnosis& diagnosis) {
+  if (diagnosis.verdict != Verdict::kUnknown) return "";
+  const auto jump = jump_within(cell, batch.in_order_of_time().rows());
+  if (!jump) return "";
+  return fmt::format(
+      " But something changed in the middle of the batch, {}: give the poses before and after it by "
+      "themselves.",
+      in_words(*jump));
+}
+
 /// What was done to which files.
 void tell_provenance(const Cell& cell, const CheckedBatch& batch, std::uint64_t seed, Diagnosis& diagnosis) {
   diagnosis.batch_hash = batch.hash();
@@ -242,7 +256,7 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
                    }});
   if (const Status done = run(steps, options); !done) return tl::make_unexpected(done.error());
   tell_sessions(*together, diagnosis);
-  diagnosis.sentence = sentence_for(diagnosis) + told_of_sessions(diagnosis);
+  diagnosis.sentence = sentence_for(diagnosis) + told_of_sessions(diagnosis) + told_of_jump(cell, batch, diagnosis);
   return diagnosis;
 }
 

@@ -681,6 +681,17 @@ TEST_F(CommandLine, WhatOneBatchLeavesOpenTheNextPosesDecide) {
   EXPECT_EQ(decided.at("findings").at(0).at("joint"), 3);
 }
 
+TEST_F(CommandLine, ADiagnosisSaysFromWherePosesAreOfATrackerThatWasMovedFar) {
+  const std::string batch = changed(measure("b", 80, 1), "x_mm", [](std::size_t row, const std::string& x) {
+    return row < 40 ? x : fmt::format("{:.4f}", std::stod(x) + 30);
+  });
+  const json found = json::parse(must({"diagnose", "--cell", cell_, "--batch", batch, "--json", "-"}).out);
+  const std::string said = found["sentence"];
+  EXPECT_TRUE(
+      std::regex_search(said, std::regex("pose 41 \\(row 42\\) on: the tracker moved, (29\\.[5-9]|30\\.[0-4])")))
+      << said;
+}
+
 TEST_F(CommandLine, ADiagnosisThatNamesNothingExtendsNothing) {
   const Finished finished = trammel({"diagnose", "--cell", cell_, "--batch", measure("good", 80, 1), "--json",
                                      file("found.json"), "--apply", "--cell-out", file("out")});
