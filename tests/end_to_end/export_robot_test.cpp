@@ -119,7 +119,7 @@ class ExportRobot : public testing::Test {
                       "drill: {xyz_mm: [100, 0, 150], q_wxyz: [0.8, 0, 0.6, 0]}}\n"
                       "payloads: {drill: {mass_kg: 20, cog_mm: [0, 0, 100]}}\ntracker: {sigma_mm: 0.01}\n");
     folder_.write("truth.yaml", "version: 1\nerror_sources:\n" + truth + "noise: {sigma_mm: 0.01}\n");
-    must({"plan", "--cell", file("cell.yaml"), "--count", "60", "-o", file("plan.csv")});
+    must({"plan", "--cell", file("cell.yaml"), "--count", "60", "--tool", "drill", "-o", file("plan.csv")});
     must({"simulate", "--cell", file("cell.yaml"), "--truth", file("truth.yaml"), "--plan", file("plan.csv"), "--tool",
           "drill", "-o", file("batch.csv")});
     must({"train", "--cell", file("cell.yaml"), "--batch", file("batch.csv"), "--level", level, "--bias", "none", "-o",
