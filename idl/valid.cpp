@@ -235,6 +235,7 @@ void shape(CdrWalk& walk, Of<ReadModelsReply>) {
     walk.longs(1);
     walk.wides(1);
     sentence(walk, "quarantine");
+    walk.flag("learned");
   });
   shape(walk, Of<ModelInfo>());
   walk.longs(1);
@@ -297,10 +298,11 @@ void shape(CdrWalk& walk, Of<ReplicaStatus>) {
   walk.enumerator("role", REPLICA_FOLLOWER);
   token(walk, "follows");
   walk.wides(1);
-  walk.list("cells", MAX_CELLS, 3 * kNumber, "cell", [&] {
+  walk.list("cells", MAX_CELLS, 4 * kNumber, "cell", [&] {
     walk.text("cell", MAX_NAME, Text::kPlain);
     walk.longs(1);
     id(walk, "hash");
+    walk.longs(1);
   });
   sentence(walk, "trouble");
 }
@@ -311,7 +313,12 @@ void shape(CdrWalk& walk, Of<BatchCopy>) {
   walk.wides(1);
   walk.text("cell", MAX_NAME, Text::kPlain);
   id(walk, "batch_id");
+  id(walk, "hash");
   file_text(walk, "csv");
+  sentence(walk, "quarantine");
+  walk.flag("discarded");
+  walk.flag("learned");
+  sentence(walk, "outcome");
 }
 
 void shape(CdrWalk& walk, Of<BatchCopied>) {

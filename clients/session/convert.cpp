@@ -264,13 +264,14 @@ DatedJob from_wire(const wire::Job& job, const std::string& server) {
 }
 
 BatchOfService from_wire(const wire::BatchInfo& batch) {
-  return {batch.cell(), batch.id(), batch.quarantine(), batch.poses(), batch.accepted_at_unix_s(), batch.hash()};
+  return {batch.cell(), batch.id(),     batch.quarantine(), batch.poses(), batch.accepted_at_unix_s(),
+          batch.hash(), batch.learned()};
 }
 
 ReplicaPart from_wire(const wire::ReplicaStatus& status) {
   ReplicaPart part{status.role() == wire::REPLICA_WRITER, status.follows().to_string(), status.epoch(), {}};
   for (const wire::ReplicaCell& cell : status.cells())
-    part.cells.push_back({cell.cell().to_string(), cell.version(), cell.hash()});
+    part.cells.push_back({cell.cell().to_string(), cell.version(), cell.hash(), cell.newest()});
   return part;
 }
 

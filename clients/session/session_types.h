@@ -131,14 +131,14 @@ struct DiagnosisAnswer {
   ModelInfo in_force;         ///< now; empty id: none
 };
 
-/// A batch in quarantine, and why.
 /// A batch that a service has.
 struct BatchOfService {
   std::string cell, batch;
   std::string reason;  ///< why it is kept out; empty: it is not
   int poses = 0;
   std::int64_t accepted_unix_s = 0;
-  std::string hash;  ///< SHA-256 of its text
+  std::string hash;      ///< SHA-256 of its text
+  bool learned = false;  ///< a model was made of it
 };
 
 /// What a replica serves a cell with.
@@ -146,6 +146,7 @@ struct ServedVersion {
   std::string cell;
   int version = 0;  ///< as that server counts; 0: none
   std::string hash;
+  int newest = 0;  ///< the highest number of a version that it knows of
 };
 
 /// Which part a server has among those that serve the same cells.

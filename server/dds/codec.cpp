@@ -279,6 +279,7 @@ wire::BatchInfo to_wire(const StoredBatch& batch) {
   info.poses(batch.poses);
   info.accepted_at_unix_s(batch.accepted_at);
   info.quarantine(told_sentence(batch.quarantine));
+  info.learned(batch.learned);
   return info;
 }
 

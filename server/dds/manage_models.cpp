@@ -1,5 +1,6 @@
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
+#include "server/dds/replicas/replica_link.h"
 
 namespace trammel {
 
@@ -59,6 +60,8 @@ Result<wire::ReleaseBatchesReply> Handlers::answer(const wire::ReleaseBatchesReq
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
   const auto job = released(cell, request);
   if (!job) return tl::make_unexpected(job.error());
+  if (replicas_ != nullptr && request.action() != wire::RELEASE_AND_TRAIN)
+    replicas_->bring_batch(cell, request.batch_ids().front());
   wire::ReleaseBatchesReply reply;
   reply.job(*job);
   return reply;

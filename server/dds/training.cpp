@@ -52,7 +52,7 @@ Result<wire::SubmitMeasurementsReply> Handlers::answer(const wire::SubmitMeasure
                                                               : request.change_id().to_string(),
                       who(request.header()));
   if (!job) return tl::make_unexpected(job.error());
-  if (replicas_ != nullptr) replicas_->copy_batch(request.about().cell(), request.batch_id(), request.csv());
+  if (replicas_ != nullptr) replicas_->bring_batch(request.about().cell(), request.batch_id());
   wire::SubmitMeasurementsReply reply;
   reply.job(*job);
   return reply;

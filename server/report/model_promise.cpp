@@ -131,11 +131,10 @@ std::string iso_table(const CompensatedModel& model, const PositionAccuracy& acc
   return html_table({"iso", {"as ISO 9283 names it", "value", "of what"}, rows});
 }
 
-/// Whether a tolerance is held, and how sure that is.
+/// Whether a tolerance is held: yes and no only where the whole interval of the promise says so.
 std::string held(const PositionAccuracy& accuracy, double tolerance) {
   if (accuracy.most() <= tolerance) return "yes";
-  if (accuracy.at(PositionAccuracy::kShare) <= tolerance) return "yes, but narrowly";
-  return accuracy.least() <= tolerance ? "not shown" : "no";
+  return accuracy.least() <= tolerance ? "cannot tell" : "no";
 }
 
 /// Rounded down, and never all of them: nobody knows that.
@@ -162,8 +161,10 @@ std::string tolerance_table(const PositionAccuracy& accuracy, const std::optiona
 std::string tolerance_sentence(const PositionAccuracy& accuracy, const std::optional<double>& of_cell) {
   if (!of_cell) return "";
   const double promised = accuracy.at(PositionAccuracy::kShare);
-  return fmt::format("<p class=\"against\">The cell must hold {:.4g} mm: <b>{}</b> ({} mm at 95 %).</p>\n",
-                     to_mm(*of_cell), held(accuracy, *of_cell), rounded_up_mm(promised));
+  return fmt::format(
+      "<p class=\"against\">The cell must hold {:.4g} mm: <b>{}</b> ({} mm at 95 %, between {} and {}).</p>\n",
+      to_mm(*of_cell), held(accuracy, *of_cell), rounded_up_mm(promised), rounded_up_mm(accuracy.least()),
+      rounded_up_mm(accuracy.most()));
 }
 
 /// What the promise stands on, where that is little; it follows "in this volume".

@@ -89,6 +89,8 @@ void prepare_audit(SQLite::Database& database, bool is_new, int schema_before) {
                                       count("batches"), count("models"), count("activations"))});
 }
 
+std::int64_t audit_rows(SQLite::Database& database) { return end_of(database).rows; }
+
 bool read_more(SQLite::Database& database, const AuditQuery& query, AuditChain& chain, AuditTrail& trail) {
   auto rows = prepare(database,
                       "SELECT number, at, who, cell, what, subject, before, after, why, request, hash_before, hash "

@@ -22,6 +22,9 @@ void record_audit(SQLite::Database& database, const AuditEntry& entry, const Cha
 /// Makes the trail where there is none, and records how it began.
 void prepare_audit(SQLite::Database& database, bool is_new, int schema_before);
 
+/// How many rows the trail has.
+[[nodiscard]] std::int64_t audit_rows(SQLite::Database& database);
+
 /// Takes the next rows into the chain and, as far as they are asked for, into the trail; false: there are no more.
 [[nodiscard]] bool read_more(SQLite::Database& database, const AuditQuery& query, AuditChain& chain, AuditTrail& trail);
 

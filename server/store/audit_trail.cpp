@@ -33,6 +33,11 @@ Result<AuditTrail> Store::audit(const AuditQuery& query) const {
   return trail;
 }
 
+Result<std::int64_t> Store::changes_made() const {
+  return connection_->exclusively(
+      [](SQLite::Database& database) -> Result<std::int64_t> { return audit_rows(database); });
+}
+
 Result<AuditTrail> read_audit(const std::string& path, const AuditQuery& query) {
   try {
     SQLite::Database database(path, SQLite::OPEN_READONLY, kBusyTimeout);

@@ -13,12 +13,28 @@
 namespace trammel {
 namespace {
 
-constexpr const char* kRecordColumns =
-    "SELECT id, hash, request_id, accepted_at, poses, job, quarantine, EXISTS (SELECT 1 FROM pruned WHERE "
-    "pruned.kind = 'batch' AND pruned.cell = batches.cell AND pruned.id = batches.id), EXISTS (SELECT 1 FROM discarded "
-    "WHERE discarded.cell = batches.cell AND discarded.batch = batches.id) FROM batches WHERE cell = ? ";
+/// Of the cell ?1. Without a reference to the row, so that it is read once.
+constexpr const char* kLearned =
+    "SELECT job_batches.batch FROM job_batches JOIN jobs ON jobs.id = job_batches.job "
+    "WHERE jobs.cell = ?1 AND jobs.state = 'done' AND jobs.model_version > 0 "
+    "UNION SELECT batch FROM learned_elsewhere WHERE cell = ?1";
 
-/// The batch in a row of kRecordColumns, without its text.
+const std::string& record_columns() {
+  static const std::string columns = fmt::format(
+      "SELECT id, hash, request_id, accepted_at, poses, job, quarantine, "
+      "EXISTS (SELECT 1 FROM pruned WHERE pruned.kind = 'batch' AND pruned.cell = batches.cell "
+      "AND pruned.id = batches.id), "
+      "EXISTS (SELECT 1 FROM discarded WHERE discarded.cell = batches.cell "
+      "AND discarded.batch = batches.id), "
+      "id IN ({}), "
+      "(SELECT CASE WHEN state IN ('queued', 'running') THEN '' WHEN message = '' THEN state "
+      "ELSE message END FROM jobs WHERE jobs.id = batches.job) "
+      "FROM batches WHERE cell = ?1 ",
+      kLearned);
+  return columns;
+}
+
+/// The batch in a row of record_columns(), without its text.
 StoredBatch record_of(const std::string& cell, SQLite::Statement& row) {
   StoredBatch batch{cell,
                     row.getColumn(0).getString(),
@@ -31,14 +47,28 @@ StoredBatch record_of(const std::string& cell, SQLite::Statement& row) {
                     row.getColumn(6).getString()};
   batch.pruned = row.getColumn(7).getInt() != 0;
   batch.discarded = row.getColumn(8).getInt() != 0;
+  batch.learned = row.getColumn(9).getInt() != 0;
+  batch.outcome = row.getColumn(10).getString();
   return batch;
 }
 
 Result<StoredBatch> read_record(SQLite::Database& database, const std::string& cell, const std::string& id) {
-  auto row = prepare(database, (std::string(kRecordColumns) + "AND id = ?").c_str(), cell, id);
+  auto row = prepare(database, (record_columns() + "AND id = ?2").c_str(), cell, id);
   if (!row.executeStep())
     return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id).of("batch").with_text(id);
   return record_of(cell, row);
+}
+
+/// As the audit trail calls it.
+std::string spoken(const std::string& quarantine) {
+  return quarantine.empty() ? "free" : "in quarantine: " + quarantine;
+}
+
+Failure other_content(const StoredBatch& batch, std::int64_t job) {
+  return failure(ErrorCode::kConflict, "cell {} already has a batch {} with other content (job {})", batch.cell,
+                 batch.id, job)
+      .of("batch")
+      .with_text(batch.id);
 }
 
 }  // namespace
@@ -58,10 +88,7 @@ Result<StoredJob> Store::add_batch(const StoredBatch& batch, const StoredJob& jo
       const std::int64_t made = present.getColumn(1).getInt64();
       // A repeat, or a client that lost its receipt.
       if (same_content) return read_job(database, made);
-      return failure(ErrorCode::kConflict, "cell {} already has a batch {} with other content (job {})", batch.cell,
-                     batch.id, made)
-          .of("batch")
-          .with_text(batch.id);
+      return other_content(batch, made);
     }
     const std::int64_t id = insert_job(database, job);
     change(database,
@@ -86,11 +113,10 @@ Status Store::set_quarantine(const std::string& cell, const std::string& id, con
       if (batch->discarded) return discarded_failure(cell, id);
       if (batch->quarantine == reason) return ChangeOutcome{};
       change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", reason, cell, id);
-      record_audit(database,
-                   {cell, reason.empty() ? "release" : "quarantine", "batch " + id,
-                    batch->quarantine.empty() ? "free" : "in quarantine: " + batch->quarantine,
-                    reason.empty() ? "free" : "in quarantine: " + reason},
-                   change_id);
+      record_audit(
+          database,
+          {cell, reason.empty() ? "release" : "quarantine", "batch " + id, spoken(batch->quarantine), spoken(reason)},
+          change_id);
       return ChangeOutcome{};
     });
   });
@@ -103,15 +129,40 @@ Status Store::discard(const std::string& cell, const std::string& id, const Chan
       const auto batch = read_record(database, cell, id);
       if (!batch) return tl::make_unexpected(batch.error());
       if (batch->discarded) return ChangeOutcome{};
-      const std::string was = batch->quarantine.empty() ? "free" : "in quarantine: " + batch->quarantine;
       const std::string now = "discarded" + (change_id.reason.empty() ? "" : ": " + change_id.reason);
       change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", now, cell, id);
       change(database, "INSERT INTO discarded (cell, batch) VALUES (?, ?)", cell, id);
-      record_audit(database, {cell, "discard", "batch " + id, was, now}, change_id);
+      record_audit(database, {cell, "discard", "batch " + id, spoken(batch->quarantine), now}, change_id);
       return ChangeOutcome{};
     });
   });
   return changed.map([](const ChangeOutcome&) {});
+}
+
+Status Store::take_over_batch(const StoredBatch& there, const ChangeId& by) {
+  return connection_->in_transaction([&](SQLite::Database& database) -> Status {
+    const auto here = read_record(database, there.cell, there.id);
+    if (!here) return tl::make_unexpected(here.error());
+    if (here->hash != there.hash) return other_content(there, here->job);
+    if (here->discarded && !there.discarded) return discarded_failure(there.cell, there.id);
+    const auto record = [&](const char* what, const std::string& before, const std::string& after) {
+      record_audit(database, {there.cell, what, "batch " + there.id, before, after}, by);
+    };
+    if (there.learned && !here->learned) {
+      change(database, "INSERT INTO learned_elsewhere (cell, batch) VALUES (?, ?)", there.cell, there.id);
+      record("follow", "", "a model was made of it");
+    }
+    if (there.discarded && !here->discarded)
+      change(database, "INSERT INTO discarded (cell, batch) VALUES (?, ?)", there.cell, there.id);
+    if (there.quarantine == here->quarantine) return {};
+    change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", there.quarantine, there.cell,
+           there.id);
+    record(there.discarded            ? "discard"
+           : there.quarantine.empty() ? "release"
+                                      : "quarantine",
+           spoken(here->quarantine), there.discarded ? there.quarantine : spoken(there.quarantine));
+    return {};
+  });
 }
 
 Result<StoredBatch> Store::batch(const std::string& cell, const std::string& id) const {
@@ -139,7 +190,7 @@ Result<StoredBatch> Store::batch_record(const std::string& cell, const std::stri
 
 Result<std::vector<StoredBatch>> Store::batches(const std::string& cell) const {
   return connection_->exclusively([&](SQLite::Database& database) -> Result<std::vector<StoredBatch>> {
-    auto rows = prepare(database, (std::string(kRecordColumns) + "ORDER BY number").c_str(), cell);
+    auto rows = prepare(database, (record_columns() + "ORDER BY number").c_str(), cell);
     std::vector<StoredBatch> batches;
     while (rows.executeStep()) batches.push_back(record_of(cell, rows));
     return batches;
@@ -148,10 +199,7 @@ Result<std::vector<StoredBatch>> Store::batches(const std::string& cell) const {
 
 Result<std::set<std::string>> Store::batches_learned_from(const std::string& cell) const {
   return connection_->exclusively([&](SQLite::Database& database) -> Result<std::set<std::string>> {
-    auto rows = prepare(database,
-                        "SELECT DISTINCT job_batches.batch FROM job_batches JOIN jobs ON jobs.id = job_batches.job "
-                        "WHERE jobs.cell = ? AND jobs.state = 'done' AND jobs.model_version > 0",
-                        cell);
+    auto rows = prepare(database, kLearned, cell);
     std::set<std::string> ids;
     while (rows.executeStep()) ids.insert(rows.getColumn(0).getString());
     return ids;

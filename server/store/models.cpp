@@ -180,7 +180,10 @@ Result<CompensatedModel> model_in(const ServedCopies::Copy& copy) {
 }
 
 int next_version(SQLite::Database& database, const std::string& cell) {
-  auto row = prepare(database, "SELECT COALESCE(MAX(version), 0) + 1 FROM models WHERE cell = ?", cell);
+  auto row = prepare(database,
+                     "SELECT MAX((SELECT COALESCE(MAX(version), 0) FROM models WHERE cell = ?1), "
+                     "COALESCE((SELECT newest FROM versions_elsewhere WHERE cell = ?1), 0)) + 1",
+                     cell);
   row.executeStep();
   return row.getColumn(0).getInt();
 }

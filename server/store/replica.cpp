@@ -26,7 +26,7 @@ std::string spoken(const std::optional<ReplicaRecord>& record) {
 
 Result<ReplicaView> Store::replica_view() const {
   return connection_->exclusively([](SQLite::Database& database) -> Result<ReplicaView> {
-    ReplicaView view{read_record(database), {}};
+    ReplicaView view{read_record(database), {}, {}};
     SQLite::Statement rows(database,
                            "SELECT a.cell, a.version, m.hash FROM "
                            "(SELECT cell, MAX(number) AS number FROM activations GROUP BY cell) AS newest "
@@ -34,6 +34,10 @@ Result<ReplicaView> Store::replica_view() const {
                            "JOIN models AS m ON m.cell = a.cell AND m.version = a.version");
     while (rows.executeStep())
       view.cells[rows.getColumn(0).getString()] = {rows.getColumn(1).getInt(), rows.getColumn(2).getString()};
+    SQLite::Statement numbers(database,
+                              "SELECT cell, MAX(number) FROM (SELECT cell, MAX(version) AS number FROM models "
+                              "GROUP BY cell UNION ALL SELECT cell, newest FROM versions_elsewhere) GROUP BY cell");
+    while (numbers.executeStep()) view.newest[numbers.getColumn(0).getString()] = numbers.getColumn(1).getInt();
     return view;
   });
 }
@@ -46,6 +50,16 @@ Status Store::keep_replica_record(const ReplicaRecord& record, const std::string
            static_cast<std::int64_t>(record.epoch), record.writes ? 1 : 0, record.follows, record.told);
     if (spoken(before) != spoken(record))
       record_audit(database, {"", "replica", "part", spoken(before), spoken(record), why});
+    return {};
+  });
+}
+
+Status Store::number_after(const std::string& cell, int newest) {
+  return connection_->in_transaction([&](SQLite::Database& database) -> Status {
+    change(database,
+           "INSERT INTO versions_elsewhere (cell, newest) VALUES (?, ?) "
+           "ON CONFLICT (cell) DO UPDATE SET newest = MAX(newest, excluded.newest)",
+           cell, newest);
     return {};
   });
 }

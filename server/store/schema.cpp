@@ -93,7 +93,8 @@ CREATE TABLE diagnoses (
 /// programs that know none. How a version was judged when a person put it in force. And the changes that clients asked
 /// for under an id, with what came of them; what of the rest has lost its text; which batches nothing takes any more;
 /// and the store's identity. And, of a server among
-/// others, which part it has (one row, or none).
+/// others, which part it has (one row, or none), the batches that models were made of elsewhere, and the highest
+/// numbers of versions there.
 constexpr const char* kTimes = R"sql(
 CREATE TABLE IF NOT EXISTS job_times (
   job         INTEGER PRIMARY KEY REFERENCES jobs (id),
@@ -163,6 +164,16 @@ CREATE TABLE IF NOT EXISTS replica (
   follows TEXT    NOT NULL,
   told    TEXT    NOT NULL
 );
+CREATE TABLE IF NOT EXISTS learned_elsewhere (
+  cell  TEXT NOT NULL,
+  batch TEXT NOT NULL,
+  PRIMARY KEY (cell, batch),
+  FOREIGN KEY (cell, batch) REFERENCES batches (cell, id)
+) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS versions_elsewhere (
+  cell   TEXT    PRIMARY KEY,
+  newest INTEGER NOT NULL
+) WITHOUT ROWID;
 )sql";
 
 /// The models whose times are not recorded: found from the keys alone, for the rest is large.

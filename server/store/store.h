@@ -34,6 +34,8 @@ struct StoredBatch {
   std::string who = {};         ///< of a new one: who sent it, for the audit trail
   bool pruned = false;          ///< its text is gone
   bool discarded = false;       ///< it stays in quarantine for ever
+  bool learned = false;         ///< a model was made of it, here or on the server that this one followed
+  std::string outcome = {};     ///< what the training that was queued with it came to; empty: it is not over
 };
 
 enum class JobState { kQueued, kRunning, kDone, kFailed };
@@ -125,6 +127,7 @@ struct VersionInForce {
 struct ReplicaView {
   std::optional<ReplicaRecord> record;          ///< empty: this server was never one of several
   std::map<std::string, VersionInForce> cells;  ///< that have a model in force
+  std::map<std::string, int> newest = {};       ///< the highest number of a version, here or given elsewhere
 };
 
 struct StoreConnection;
@@ -188,7 +191,12 @@ class Store {
   [[nodiscard]] Result<StoredBatch> batch(const std::string& cell, const std::string& id) const;
   /// The same without its text: cheap.
   [[nodiscard]] Result<StoredBatch> batch_record(const std::string& cell, const std::string& id) const;
-  /// The ids of the batches that any model of the cell was trained from.
+  /// Takes over what became of the batch on the server that writes: quarantine, discarded and learned. Refuses
+  /// (kNotFound) one that is not here, (kConflict) other content and one that was discarded here and not there.
+  [[nodiscard]] Status take_over_batch(const StoredBatch& there, const ChangeId& by);
+  /// How many changes the audit trail has: another number, another state of what it tells of.
+  [[nodiscard]] Result<std::int64_t> changes_made() const;
+  /// The ids of the batches that any model of the cell was trained from, here or on the server that this one followed.
   [[nodiscard]] Result<std::set<std::string>> batches_learned_from(const std::string& cell) const;
   /// Puts the batch in quarantine for `reason`, or releases it (empty). Refuses (kConflict) one that was discarded.
   [[nodiscard]] Status set_quarantine(const std::string& cell, const std::string& id, const std::string& reason,
@@ -240,6 +248,8 @@ class Store {
   /// Whether the cell's history has a model of this hash, with its text.
   [[nodiscard]] Result<bool> has_model(const std::string& cell, const std::string& hash) const;
   [[nodiscard]] Result<ReplicaView> replica_view() const;
+  /// The next version of the cell made here has a higher number than this one, which another server has given.
+  [[nodiscard]] Status number_after(const std::string& cell, int newest);
   /// `why`: for the audit trail, where the part changes.
   [[nodiscard]] Status keep_replica_record(const ReplicaRecord& record, const std::string& why);
   /// Empty: nothing is in force.

@@ -572,14 +572,34 @@ void Trainer::end_jobs_done_elsewhere(const std::string& cell, const std::string
     };
     if (job.cell != cell || job.kind != JobKind::kTrain || job.batch_ids.empty()) continue;
     if (!std::all_of(job.batch_ids.begin(), job.batch_ids.end(), is_learned)) continue;
-    if (queue_.cancel(job.id) != JobQueue::Cancelled::kRemoved) continue;
-    const std::string what = by + " has learned from it";
-    if (!store_.set_job_done(job.id, what)) continue;
-    JobProgress progress = progress_of(job);
-    progress.stage = JobStage::kDone;
-    progress.what = what;
-    book_.report(progress);
+    end_job_done_elsewhere(job, by + " has learned from it");
   }
+}
+
+void Trainer::end_job_done_elsewhere(const StoredJob& job, const std::string& what) {
+  if (queue_.cancel(job.id) != JobQueue::Cancelled::kRemoved) return;
+  if (!store_.set_job_done(job.id, what)) return;
+  JobProgress progress = progress_of(job);
+  progress.stage = JobStage::kDone;
+  progress.what = what;
+  book_.report(progress);
+}
+
+Status Trainer::adopt_batch(const StoredBatch& there, const std::string& by) {
+  if (!there.csv.empty()) {
+    if (const auto kept = submit(there.cell, there.id, there.csv, "", by); !kept)
+      return tl::make_unexpected(kept.error());
+  }
+  ChangeId change;
+  change.who = by;
+  if (const Status taken = store_.take_over_batch(there, change); !taken) return taken;
+  if (there.outcome.empty()) return {};
+  const auto here = store_.batch_record(there.cell, there.id);
+  if (!here) return tl::make_unexpected(here.error());
+  const auto job = store_.job(here->job);
+  if (!job) return tl::make_unexpected(job.error());
+  end_job_done_elsewhere(*job, fmt::format("{}: {}", by, there.outcome));
+  return {};
 }
 
 int Trainer::queued_jobs() const { return static_cast<int>(queue_.size()); }

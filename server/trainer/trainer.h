@@ -124,6 +124,10 @@ class Trainer {
   }
   /// Whether what is in force is decided here. Where it is not, jobs wait, and adopt() alone changes what is in force.
   void set_decides(bool decides);
+  /// Takes over a batch of the server that writes, and what became of it there; without its text: it is here already.
+  /// The training that came with it is over here when it is over there. Refuses as submit() and
+  /// Store::take_over_batch() do.
+  [[nodiscard]] Status adopt_batch(const StoredBatch& there, const std::string& by);
   /// See ModelHistory. Jobs that wait for batches which the model has learned from are done.
   [[nodiscard]] Result<int> adopt(const std::string& cell, const VersionInForce& decided, const std::string& text,
                                   const ChangeId& by);
@@ -152,6 +156,7 @@ class Trainer {
  private:
   /// Ends the trainings that wait and would learn only what the models of the cell have learned.
   void end_jobs_done_elsewhere(const std::string& cell, const std::string& by);
+  void end_job_done_elsewhere(const StoredJob& job, const std::string& what);
   /// Loads models in the background, tries a store again that cannot be written, and tells of other troubles than
   /// `told`.
   void keep_up(std::vector<std::string> told, const std::stop_token& stop);

@@ -169,6 +169,8 @@ TEST(SafeType, TheShapeOfEveryReplyAndStateIsThatOfItsType) {
   read.jobs({some_job(), some_job()});
   BatchInfo batch;
   batch.id("lt-07");
+  batch.quarantine("it does not fit");
+  batch.learned(true);
   read.batches({batch});
   read.text("{}");
   expect_shape<ReadModels::Reply>(read);
@@ -195,13 +197,19 @@ TEST(SafeType, TheShapeOfEveryReplyAndStateIsThatOfItsType) {
   replica.cells().resize(2);
   replica.cells()[1].cell("cell-7");
   replica.cells()[1].hash("ab");
+  replica.cells()[1].newest(4);
   replica.trouble("two write");
   expect_shape<ReplicaStatusTopic::Type>(replica);
   BatchCopy copy;
   copy.to("trammel-2");
   copy.cell("cell-7");
   copy.batch_id("lt-07");
+  copy.hash("ab");
   copy.csv("q1_deg\n1\n");
+  copy.quarantine("discarded: a bump");
+  copy.discarded(true);
+  copy.learned(true);
+  copy.outcome("it does not fit");
   expect_shape<BatchCopyTopic::Type>(copy);
   BatchCopied copied;
   copied.result(RESULT_MALFORMED);

@@ -103,6 +103,9 @@ class ReplicasTest : public testing::Test {
     return test::run(words, kLimit);
   }
 
+  nlohmann::json batches_of(const test::Daemon& daemon) {
+    return nlohmann::json::parse(ask(daemon, {"batches", "--cell", "cell-7", "--json", "-"}).out).at("batches");
+  }
   bool wait_until_it_keeps(const test::Daemon& daemon, const std::string& batch) {
     std::string kept;
     for (const auto until = steady_clock::now() + kLimit;
@@ -219,6 +222,72 @@ TEST_F(ReplicasTest, ABatchIsOnTheFollowerBeforeItIsAcknowledged) {
   const auto kept = ask(second_, {"batches", "--cell", "cell-7", "--json", "-"});
   EXPECT_EQ(kept.exit_code, 0) << kept.err;
   EXPECT_NE(kept.out.find("lt-1"), std::string::npos) << kept.out;
+}
+
+TEST_F(ReplicasTest, WhatWasDiscardedIsDiscardedOnTheFollowerBeforeItIsAcknowledged) {
+  give_usual_parts(", batches_to_followers: true, copy_timeout_s: 30");
+  start_both();
+  learn("lt-1", 1);
+  ASSERT_TRUE(session_->submit_measurements("cell-7", "lt-2", test::virtual_batch_csv(60, 2)));
+  client::ChangeOptions because;
+  because.reason = "the tracker was bumped";
+  ASSERT_TRUE(session_->discard("cell-7", "lt-2", because));
+  first_.kill();
+  const auto kept = batches_of(second_);
+  ASSERT_EQ(kept.size(), 2u);
+  EXPECT_EQ(kept[1]["reason"], "discarded: the tracker was bumped");
+  give(1, "role: writer");
+  second_.process().signal(SIGHUP);
+  ASSERT_TRUE(knows_as_writer(second_)) << second_.process().standard_error();
+  learn("lt-3", 3);
+  const auto versions = session_->models("cell-7");
+  ASSERT_TRUE(versions) << sentence(versions.error());
+  for (const client::ModelInfo& version : *versions)
+    EXPECT_EQ(version.batch_id.find("lt-2"), std::string::npos) << version.batch_id;
+}
+
+TEST_F(ReplicasTest, APromotedFollowerLearnsOnWithAllThatTheWriterHadLearnedFrom) {
+  give_usual_parts(", batches_to_followers: true, copy_timeout_s: 30");
+  start_both();
+  learn("lt-1", 1);
+  learn("lt-2", 2);  // version 2, whether it is in force or not
+  ASSERT_TRUE(wait_until(same));
+  ASSERT_TRUE(
+      wait_until([](const ServerStatus&, const ServerStatus& b) { return b.replica->cells.at(0).newest == 2; }));
+  const auto is_learned = [](const nlohmann::json& batches) {
+    return batches.size() == 2 && batches[0]["learned"] == true && batches[1]["learned"] == true;
+  };
+  for (const auto until = steady_clock::now() + kLimit;
+       !is_learned(batches_of(second_)) && steady_clock::now() < until;) {
+  }
+  ASSERT_TRUE(is_learned(batches_of(second_)));
+  first_.kill();
+  give(1, "role: writer");
+  second_.process().signal(SIGHUP);
+  ASSERT_TRUE(knows_as_writer(second_)) << second_.process().standard_error();
+  learn("lt-3", 3);
+  const auto versions = session_->models("cell-7");
+  ASSERT_TRUE(versions) << sentence(versions.error());
+  EXPECT_EQ(versions->back().version, 3) << "version 2 is another model";
+  EXPECT_EQ(versions->back().batch_id, "lt-1+lt-2+lt-3");
+}
+
+TEST_F(ReplicasTest, ABatchThatOnlyTheOldWriterDiscardedIsSaidByTheNewOne) {
+  give_usual_parts(", batches_to_followers: true, copy_timeout_s: 1");
+  start_both();
+  learn("lt-1", 1);
+  ASSERT_TRUE(wait_until(same));
+  second_.kill();
+  ASSERT_TRUE(session_->discard("cell-7", "lt-1"));
+  first_.kill();
+  give(1, "role: writer, batches_to_followers: true, copy_timeout_s: 1");
+  second_.start();
+  ASSERT_TRUE(knows_as_writer(second_)) << second_.process().standard_error();
+  first_.start();
+  ASSERT_TRUE(second_.process().wait_for_line("batch lt-1 of cell cell-7 was discarded", kLimit))
+      << second_.process().standard_error();
+  ASSERT_TRUE(session_->discard("cell-7", "lt-1")) << "once it is discarded there, too, nothing is left to say";
+  EXPECT_TRUE(second_.process().wait_for_line("over: ", kLimit)) << second_.process().standard_error();
 }
 
 TEST_F(ReplicasTest, AFollowerThatWasAwayGetsTheBatchesThatItLacks) {

@@ -214,6 +214,16 @@ TEST_F(ModelPage, HoldsThePromiseAgainstTheToleranceOfTheCell) {
   EXPECT_FALSE(has(model_page(trained("none"), std::nullopt), "The cell must hold"));
 }
 
+TEST_F(ModelPage, SaysYesOrNoToNoToleranceThatIsInsideItsInterval) {
+  const auto promise = PositionAccuracy::of(trained_on(cell_with(""), batch_));
+  ASSERT_LT(promise->least(), promise->most());
+  for (const double tolerance :
+       {0.9 * promise->least() + 0.1 * promise->most(), 0.1 * promise->least() + 0.9 * promise->most()}) {
+    const auto cell = cell_with(fmt::format("tolerance_mm: {}\n", 1000 * tolerance));
+    EXPECT_TRUE(has(model_page(trained_on(cell, batch_), std::nullopt), " mm: <b>cannot tell</b>")) << tolerance;
+  }
+}
+
 TEST_F(ModelPage, KnowsTheRepeatabilityFromRepeatsOnly) {
   const CompensatedModel model = trained("none");
   MeasurementBatch repeated = check_against_cell(batch_, *cell_)->rows();

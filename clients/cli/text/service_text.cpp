@@ -227,12 +227,21 @@ ordered_json quarantine_json(const std::vector<client::BatchOfService>& batches)
   return list;
 }
 
+namespace {
+
+std::string state_of(const client::BatchOfService& batch) {
+  if (!batch.reason.empty()) return "in quarantine: " + batch.reason;
+  return batch.learned ? "learned from" : "not learned from";
+}
+
+}  // namespace
+
 std::string batches_text(const std::vector<client::BatchOfService>& batches) {
   if (batches.empty()) return "no batches\n";
   std::string text = fmt::format("{:<16}{:<24}{:>7}  {:<18}{}\n", "cell", "batch", "poses", "accepted", "state");
   for (const client::BatchOfService& one : batches) {
     text += fmt::format("{:<16}{:<24}{:>7}  {:<18}{}\n", one.cell, one.batch, one.poses, date_text(one.accepted_unix_s),
-                        one.reason.empty() ? "learned from" : "in quarantine: " + one.reason);
+                        state_of(one));
   }
   return text + "(dates in UTC)\n";
 }
@@ -246,7 +255,8 @@ ordered_json batches_json(const std::vector<client::BatchOfService>& batches) {
                     {"accepted_unix_s", one.accepted_unix_s},
                     {"hash", one.hash},
                     {"in_quarantine", !one.reason.empty()},
-                    {"reason", one.reason}});
+                    {"reason", one.reason},
+                    {"learned", one.learned}});
   }
   return list;
 }

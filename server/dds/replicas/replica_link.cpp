@@ -11,12 +11,23 @@ namespace {
 
 constexpr std::chrono::milliseconds kStep{250};        // at the longest; news wake it
 constexpr std::chrono::milliseconds kDivergent{3000};  // of two that are in step, longer than any copy takes
-constexpr std::chrono::seconds kCatchUpAgain{5};       // with a follower that did not say it has a batch
 constexpr std::chrono::seconds kModelComes{10};        // after it was told of
-constexpr std::size_t kCopiesRemembered = 100'000;
 // That may wait to be stored: the writer sends the others again. One is taken however large it is.
 constexpr std::size_t kCopiesAtOnce = 64;
 constexpr std::size_t kCopiedBytesAtOnce = 64'000'000;
+
+StoredBatch batch_in(const wire::BatchCopy& copy) {
+  StoredBatch batch;
+  batch.cell = copy.cell().to_string();
+  batch.id = copy.batch_id();
+  batch.csv = copy.csv();
+  batch.hash = copy.hash();
+  batch.quarantine = copy.quarantine();
+  batch.discarded = copy.discarded();
+  batch.learned = copy.learned();
+  batch.outcome = copy.outcome();
+  return batch;
+}
 
 template <typename State>
 Result<wire::dds::DataWriter*> make_writer(wire::dds::DomainParticipant& participant, wire::dds::Publisher& publisher,
@@ -43,7 +54,7 @@ Result<std::unique_ptr<ReplicaLink>> ReplicaLink::open(wire::dds::DomainParticip
     return tl::make_unexpected(opened.error());
   ReplicaLink* self = link.get();
   link->replicas_thread_ = std::jthread([self](const std::stop_token& stop) { self->run(stop); });
-  link->copies_thread_ = std::jthread([self](const std::stop_token& stop) { self->run_copies(stop); });
+  link->sender_.start(*link->copy_writer_);
   return link;
 }
 
@@ -55,14 +66,16 @@ ReplicaLink::ReplicaLink(wire::dds::Subscriber& subscriber, std::string server, 
       trainer_(trainer),
       store_(store),
       listener_(std::move(listener)),
+      sender_(
+          server_, options, trainer, store, [this](const std::string& cell) { return followers_of(cell); },
+          [this](const std::string& trouble) { set_trouble("batches", trouble); }, listener_),
       role_(server_, options, Clock::now()) {}
 
 ReplicaLink::~ReplicaLink() {
-  for (std::jthread* thread : {&replicas_thread_, &copies_thread_}) thread->request_stop();
+  replicas_thread_.request_stop();
   wake();
-  for (std::jthread* thread : {&replicas_thread_, &copies_thread_}) {
-    if (thread->joinable()) thread->join();
-  }
+  if (replicas_thread_.joinable()) replicas_thread_.join();
+  sender_.stop();
 }
 
 bool ReplicaLink::begin() {
@@ -121,10 +134,7 @@ Status ReplicaLink::listen_to_snapshots() {
 }
 
 Status ReplicaLink::cells_added() {
-  {
-    const MutexLock lock(mutex_);
-    for (const auto& [server, heard] : heard_) behind_.insert(server);
-  }
+  sender_.look_again();
   wake();
   return listen_to_snapshots();
 }
@@ -138,6 +148,7 @@ void ReplicaLink::wake() {
 }
 
 void ReplicaLink::on_status(const wire::ReplicaStatus* status, const std::string& participant) {
+  bool is_other = false;  // than it was
   {
     const MutexLock lock(mutex_);
     woken_ = true;
@@ -148,13 +159,14 @@ void ReplicaLink::on_status(const wire::ReplicaStatus* status, const std::string
       Heard& heard = heard_[name];
       const bool follows_anew = heard.status.follows().to_string() != status->follows().to_string();
       const bool has_more_cells = heard.status.cells().size() < status->cells().size();
-      if (heard.participant != participant || follows_anew || has_more_cells) behind_.insert(name);
+      is_other = heard.participant != participant || follows_anew || has_more_cells;
       heard = {participant, *status, Clock::now()};
     } else if (participant != participant_) {
       namesakes_.insert(participant);
     }
   }
   changed_.notify_all();
+  if (is_other) sender_.look_again();
 }
 
 void ReplicaLink::on_snapshot(const wire::ModelSnapshot* snapshot) {
@@ -197,9 +209,12 @@ void ReplicaLink::on_copied(const wire::BatchCopied* copied, const std::string& 
     const MutexLock lock(mutex_);
     if (!is_its_own(copied->server().to_string(), participant)) return;
   }
+  const bool is_there = copied->result() != wire::RESULT_NOT_FOUND;
   const Status outcome =
-      copied->result() == wire::RESULT_OK ? Status() : Status(failure(ErrorCode::kRefused, "{}", copied->why()));
-  copies_.answered(copied->server().to_string(), copied->number(), outcome);
+      copied->result() == wire::RESULT_OK
+          ? Status()
+          : Status(failure(is_there ? ErrorCode::kRefused : ErrorCode::kNotFound, "{}", copied->why()));
+  sender_.answered(copied->server().to_string(), copied->number(), outcome);
 }
 
 std::optional<ChangesElsewhere> ReplicaLink::changes_elsewhere() const {
@@ -242,6 +257,7 @@ std::vector<OtherReplica> ReplicaLink::others() const {
     for (const wire::ReplicaCell& cell : status.cells()) {
       if (!trainer_.cells().contains(cell.cell().to_string())) continue;
       shares = true;
+      other.newest[cell.cell().to_string()] = cell.newest();
       if (cell.version() > 0) other.cells[cell.cell().to_string()] = {cell.version(), cell.hash()};
     }
     if (shares) all.push_back(std::move(other));
@@ -283,6 +299,7 @@ RoleDecision ReplicaLink::decide(const ReplicaRecord& record, const std::vector<
   record_ = record;
   if (!new_options_) return role_.decide(record, others, Clock::now());
   const RoleDecision told = role_.told(record, *new_options_, others);
+  sender_.set_options(role_.options());
   new_options_.reset();
   return told;
 }
@@ -309,9 +326,15 @@ void ReplicaLink::set_may_change(bool may) {
     may_change_ = may;
   }
   trainer_.set_decides(may);
+  sender_.set_writes(may);
 }
 
 void ReplicaLink::follow(const OtherReplica& leader, const ReplicaView& view) {
+  for (const auto& [cell, newest] : leader.newest) {
+    const auto known = view.newest.find(cell);
+    if (newest > (known == view.newest.end() ? 0 : known->second))
+      static_cast<void>(store_.number_after(cell, newest));  // else with the next step
+  }
   std::string wrong;
   bool has_all = true;
   for (const auto& [cell, wanted] : leader.cells) {
@@ -404,8 +427,8 @@ void ReplicaLink::keep_copies() {
     answer.server(server_);
     answer.to(from);
     answer.number(copy.number());
-    const auto kept = from == leader ? trainer_.submit(copy.cell().to_string(), copy.batch_id(), copy.csv(), "", from)
-                                     : failure(ErrorCode::kConflict, "{} does not follow {}", server_, from);
+    const Status kept = from == leader ? trainer_.adopt_batch(batch_in(copy), from)
+                                       : Status(failure(ErrorCode::kConflict, "{} does not follow {}", server_, from));
     if (!kept) {
       answer.result(to_wire(kept.error().code));
       answer.why(cut(sentence(kept.error()), wire::MAX_SENTENCE));
@@ -461,6 +484,7 @@ void ReplicaLink::publish(const ReplicaView& view) {
       one.version(found->second.version);
       one.hash(found->second.hash);
     }
+    if (const auto found = view.newest.find(name); found != view.newest.end()) one.newest(found->second);
     status.cells().push_back(one);
   }
   status.trouble(cut(fmt::format("{}", fmt::join(troubles(), "; ")), wire::MAX_SENTENCE));
@@ -511,107 +535,16 @@ ReplicaFigures ReplicaLink::figures() const {
   return now;
 }
 
-std::vector<std::string> ReplicaLink::followers_of(const std::string& cell) const {
-  std::vector<std::string> followers;
+std::map<std::string, std::string> ReplicaLink::followers_of(const std::string& cell) const {
+  std::map<std::string, std::string> followers;
   const MutexLock lock(mutex_);
   for (const auto& [name, heard] : heard_) {
     const auto& cells = heard.status.cells();
     const bool serves =
         std::any_of(cells.begin(), cells.end(), [&](const auto& one) { return one.cell().to_string() == cell; });
-    if (serves && heard.status.follows().to_string() == server_) followers.push_back(name);
+    if (serves && heard.status.follows().to_string() == server_) followers[name] = heard.participant;
   }
   return followers;
-}
-
-void ReplicaLink::copy_batch(const std::string& cell, const std::string& batch_id, const std::string& csv) {
-  {
-    const MutexLock lock(mutex_);
-    if (!role_.options().batches_to_followers) return;
-  }
-  const std::map<std::string, Error> wrong = send_copies(followers_of(cell), cell, batch_id, csv);
-  for (const auto& [follower, why] : wrong) {
-    if (listener_)
-      listener_({"replica_batch_not_copied",
-                 fmt::format("batch {} of cell {} is not on {} yet: {}", batch_id, cell, follower, sentence(why))});
-    const MutexLock lock(mutex_);
-    behind_.insert(follower);
-  }
-}
-
-std::map<std::string, Error> ReplicaLink::send_copies(const std::vector<std::string>& followers,
-                                                      const std::string& cell, const std::string& batch_id,
-                                                      const std::string& csv) {
-  const std::map<std::string, std::uint64_t> numbers = copies_.expect(followers);
-  double patience_s = 0;
-  {
-    const MutexLock lock(mutex_);
-    patience_s = role_.options().copy_timeout_s;
-  }
-  wire::BatchCopy copy;
-  copy.server(server_);
-  copy.cell(cell);
-  copy.batch_id(batch_id);
-  copy.csv(csv);
-  for (const auto& [follower, number] : numbers) {
-    copy.to(follower);
-    copy.number(number);
-    copy_writer_->write(&copy);
-  }
-  return copies_.wait(numbers, Clock::now() + std::chrono::milliseconds(static_cast<int>(1000 * patience_s)));
-}
-
-void ReplicaLink::run_copies(const std::stop_token& stop) {
-  ::pthread_setname_np(::pthread_self(), "batch copies");
-  while (!stop.stop_requested()) {
-    std::set<std::string> behind;
-    {
-      MutexLock lock(mutex_);
-      if (role_.options().batches_to_followers && may_change_) behind.swap(behind_);
-    }
-    std::set<std::string> lacking;
-    for (const std::string& follower : behind) {
-      if (!stop.stop_requested() && !bring_up_to_date(follower, stop)) lacking.insert(follower);
-    }
-    if (!behind.empty() || lacking.empty())
-      set_trouble("batches", lacking.empty()
-                                 ? ""
-                                 : fmt::format("{} may lack batches that {} has", fmt::join(lacking, ", "), server_));
-    MutexLock lock(mutex_);
-    behind_.insert(lacking.begin(), lacking.end());
-    const auto pause = lacking.empty() ? std::chrono::milliseconds(kStep) : std::chrono::milliseconds(kCatchUpAgain);
-    changed_.wait_for(lock, stop, pause, [] { return false; });
-  }
-}
-
-std::string ReplicaLink::participant_now(const std::string& server) const {
-  const MutexLock lock(mutex_);
-  const auto found = heard_.find(server);
-  return found == heard_.end() ? std::string() : found->second.participant;
-}
-
-bool ReplicaLink::bring_up_to_date(const std::string& follower, const std::stop_token& stop) {
-  bool has_all = true;
-  if (copied_to_.size() > kCopiesRemembered) copied_to_.clear();
-  const std::string participant = participant_now(follower);
-  for (const auto& [cell, description] : trainer_.cells()) {
-    const std::vector<std::string> followers = followers_of(cell);
-    if (std::find(followers.begin(), followers.end(), follower) == followers.end()) continue;
-    for (const StoredBatch& record : store_.batches(cell).value_or(std::vector<StoredBatch>())) {
-      if (stop.stop_requested()) return false;
-      if (record.pruned || record.discarded) continue;
-      if (const auto said = copied_to_.find({participant, cell, record.id}); said != copied_to_.end()) {
-        has_all = has_all && said->second;
-        continue;
-      }
-      const auto batch = store_.batch(cell, record.id);
-      if (!batch) continue;
-      const std::map<std::string, Error> wrong = send_copies({follower}, cell, record.id, batch->csv);
-      if (!wrong.empty() && wrong.begin()->second.code == ErrorCode::kUnreachable) return false;
-      copied_to_[{participant, cell, record.id}] = wrong.empty();
-      has_all = has_all && wrong.empty();  // a batch that it refuses keeps none of the next ones from it
-    }
-  }
-  return has_all;
 }
 
 }  // namespace trammel

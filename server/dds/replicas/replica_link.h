@@ -18,7 +18,7 @@
 
 #include "idl/state_reader.h"
 #include "server/base/mutex.h"
-#include "server/dds/replicas/batch_copies.h"
+#include "server/dds/replicas/batch_sender.h"
 #include "server/dds/replicas/replica_news.h"
 #include "server/dds/replicas/replica_role.h"
 #include "server/metrics/service_figures.h"
@@ -27,8 +27,9 @@
 
 namespace trammel {
 
-/// The other servers of the same cells: who writes, what followers load, and the copies of batches. DDS finds them,
-/// tells who has left and brings models and batches; what is decided is in ReplicaRole. Has two threads. Thread-safe.
+/// The other servers of the same cells: who writes, and what followers load and store. DDS finds them, tells who has
+/// left and brings models and batches; what is decided is in ReplicaRole, what is sent in BatchSender. Has a thread.
+/// Thread-safe.
 class ReplicaLink {
  public:
   /// Without a part among others (Role::kAlone) it is null: nobody is told of it. `snapshots` is the topic of
@@ -44,9 +45,9 @@ class ReplicaLink {
 
   /// Whether a change is to be made elsewhere; empty: here.
   [[nodiscard]] std::optional<ChangesElsewhere> changes_elsewhere() const;
-  /// Brings a batch that is stored here to the followers, where the file asks for it, and waits for them. What could
-  /// not be copied is said to the listener and in troubles(), and copied later.
-  void copy_batch(const std::string& cell, const std::string& batch_id, const std::string& csv);
+  /// A batch is stored here, or something has become of it: brings it to the followers, where the file asks for it, and
+  /// waits for them. What could not be brought is said to the listener and in troubles(), and brought later.
+  void bring_batch(const std::string& cell, const std::string& batch_id) { sender_.bring(cell, batch_id); }
   /// What is in force has changed here: it is told.
   void changed() { wake(); }
   /// The trainer serves more cells: what other servers have of them is asked for again. Call it from one thread.
@@ -112,17 +113,8 @@ class ReplicaLink {
   void tell_troubles();
   void set_trouble(const std::string& kind, const std::string& what);
 
-  // In the thread of the copies.
-  void run_copies(const std::stop_token& stop);
-  /// All batches that the follower may lack; false: it has not said that it has one of them.
-  [[nodiscard]] bool bring_up_to_date(const std::string& follower, const std::stop_token& stop);
-  /// To these followers; what is wrong by follower.
-  [[nodiscard]] std::map<std::string, Error> send_copies(const std::vector<std::string>& followers,
-                                                         const std::string& cell, const std::string& batch_id,
-                                                         const std::string& csv);
-  [[nodiscard]] std::vector<std::string> followers_of(const std::string& cell) const;
-  /// Empty: it is not there.
-  [[nodiscard]] std::string participant_now(const std::string& server) const;
+  /// The followers that serve the cell: their participants by their names.
+  [[nodiscard]] std::map<std::string, std::string> followers_of(const std::string& cell) const;
 
   wire::dds::Subscriber& subscriber_;
   const std::string server_, participant_;
@@ -134,27 +126,22 @@ class ReplicaLink {
   wire::dds::DataWriter* status_writer_ = nullptr;
   wire::dds::DataWriter* copy_writer_ = nullptr;
   wire::dds::DataWriter* copied_writer_ = nullptr;
-  BatchCopies copies_;
   std::atomic<std::uint64_t> epoch_{0};
 
   Mutex listening_;  // while the reader of snapshots is made anew
   mutable Mutex mutex_;
   mutable Condition changed_;
+  BatchSender sender_;
   bool woken_ TRAMMEL_GUARDED_BY(mutex_) = false;
   std::map<std::string, Heard> heard_ TRAMMEL_GUARDED_BY(mutex_);                                 // by server
   std::map<std::pair<std::string, std::string>, Snapshot> snapshots_ TRAMMEL_GUARDED_BY(mutex_);  // by server and cell
   std::deque<wire::BatchCopy> arrived_ TRAMMEL_GUARDED_BY(mutex_);
   std::set<std::string> namesakes_ TRAMMEL_GUARDED_BY(mutex_);              // participants of servers of the same name
-  std::set<std::string> behind_ TRAMMEL_GUARDED_BY(mutex_);                 // followers that may lack batches
   std::map<std::string, std::string> troubles_ TRAMMEL_GUARDED_BY(mutex_);  // by kind
   ReplicaRole role_ TRAMMEL_GUARDED_BY(mutex_);
   ReplicaRecord record_ TRAMMEL_GUARDED_BY(mutex_);  // as it is stored
   bool may_change_ TRAMMEL_GUARDED_BY(mutex_) = false;
   std::optional<ReplicaOptions> new_options_ TRAMMEL_GUARDED_BY(mutex_);
-
-  // Of the thread of the copies: what participants have said of batches, by participant, cell and batch. True: they
-  // have it. Whoever comes back after a cut is not sent all of them again.
-  std::map<std::tuple<std::string, std::string, std::string>, bool> copied_to_;
 
   // Of the thread of the replicas.
   bool begun_ = false;
@@ -173,7 +160,6 @@ class ReplicaLink {
   std::unique_ptr<wire::StateReader<wire::BatchCopyTopic>> copy_reader_;
   std::unique_ptr<wire::StateReader<wire::BatchCopiedTopic>> copied_reader_;
   std::jthread replicas_thread_;
-  std::jthread copies_thread_;
 };
 
 }  // namespace trammel

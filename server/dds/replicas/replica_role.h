@@ -19,6 +19,7 @@ struct OtherReplica {
   std::string follows = {};
   std::uint64_t epoch = 0;
   std::map<std::string, VersionInForce> cells = {};  ///< that are served here too, and have a model there
+  std::map<std::string, int> newest = {};            ///< the highest number of a version, of cells that are served here
 };
 
 /// What this server is to be, and why.
