@@ -143,6 +143,8 @@ Status Store::take_over_batch(const StoredBatch& there, const ChangeId& by) {
   return connection_->in_transaction([&](SQLite::Database& database) -> Status {
     const auto here = read_record(database, there.cell, there.id);
     if (!here) return tl::make_unexpected(here.error());
+    // What keeps it out is that it has a reason, whatever that says.
+    const std::string quarantine = there.discarded && there.quarantine.empty() ? "discarded" : there.quarantine;
     if (here->hash != there.hash) return other_content(there, here->job);
     if (here->discarded && !there.discarded) return discarded_failure(there.cell, there.id);
     const auto record = [&](const char* what, const std::string& before, const std::string& after) {
@@ -154,13 +156,12 @@ Status Store::take_over_batch(const StoredBatch& there, const ChangeId& by) {
     }
     if (there.discarded && !here->discarded)
       change(database, "INSERT INTO discarded (cell, batch) VALUES (?, ?)", there.cell, there.id);
-    if (there.quarantine == here->quarantine) return {};
-    change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", there.quarantine, there.cell,
-           there.id);
-    record(there.discarded            ? "discard"
-           : there.quarantine.empty() ? "release"
-                                      : "quarantine",
-           spoken(here->quarantine), there.discarded ? there.quarantine : spoken(there.quarantine));
+    if (quarantine == here->quarantine) return {};
+    change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", quarantine, there.cell, there.id);
+    record(there.discarded      ? "discard"
+           : quarantine.empty() ? "release"
+                                : "quarantine",
+           spoken(here->quarantine), there.discarded ? quarantine : spoken(quarantine));
     return {};
   });
 }

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "server/base/text_file.h"
@@ -179,13 +180,15 @@ Result<CompensatedModel> model_in(const ServedCopies::Copy& copy) {
   return deserialize(*text, copy.file, ModelTexts::kAsTheyAre);
 }
 
-int next_version(SQLite::Database& database, const std::string& cell) {
+Result<int> next_version(SQLite::Database& database, const std::string& cell) {
   auto row = prepare(database,
                      "SELECT MAX((SELECT COALESCE(MAX(version), 0) FROM models WHERE cell = ?1), "
                      "COALESCE((SELECT newest FROM versions_elsewhere WHERE cell = ?1), 0)) + 1",
                      cell);
   row.executeStep();
-  return row.getColumn(0).getInt();
+  const std::int64_t next = row.getColumn(0).getInt64();
+  if (next > std::numeric_limits<int>::max()) return refused("cell {} has no number left for a version", cell);
+  return static_cast<int>(next);
 }
 
 }  // namespace
@@ -195,7 +198,9 @@ Result<int> Store::add_model(const std::string& cell, const CompensatedModel& mo
                              const JobOutcome& outcome) {
   const std::string content = serialize(model);
   const auto insert = [&](SQLite::Database& database) -> Result<ChangeOutcome> {
-    const int version = next_version(database, cell);
+    const auto next = next_version(database, cell);
+    if (!next) return tl::make_unexpected(next.error());
+    const int version = *next;
     insert_model(database, cell, version, model, content);
     record_audit(
         database,
@@ -264,10 +269,10 @@ void mend_model(SQLite::Database& database, const std::string& cell, int version
 }
 
 /// The other server's number, if it is free here: what is stored already is not written over.
-int free_version(SQLite::Database& database, const std::string& cell, int wanted) {
+Result<int> free_version(SQLite::Database& database, const std::string& cell, int wanted) {
   const bool taken =
       prepare(database, "SELECT 1 FROM models WHERE cell = ? AND version = ?", cell, wanted).executeStep();
-  return taken || wanted < 1 ? next_version(database, cell) : wanted;
+  return taken || wanted < 1 || wanted > kHighestTold ? next_version(database, cell) : Result<int>(wanted);
 }
 
 }  // namespace
@@ -280,7 +285,9 @@ Result<int> Store::adopt(const std::string& cell, const VersionInForce& decided,
     if (!version && model == nullptr)
       return failure(ErrorCode::kNotFound, "cell {} has no model {}", cell, decided.hash).of("hash");
     if (!version) {
-      version = free_version(database, cell, decided.version);
+      const auto free = free_version(database, cell, decided.version);
+      if (!free) return free;
+      version = *free;
       insert_model(database, cell, *version, *model, content);
       record_audit(database,
                    {cell, "follow", fmt::format("version {}", *version), "", fmt::format("sha256 {}", decided.hash),

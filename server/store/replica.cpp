@@ -55,6 +55,10 @@ Status Store::keep_replica_record(const ReplicaRecord& record, const std::string
 }
 
 Status Store::number_after(const std::string& cell, int newest) {
+  if (newest > kHighestTold)
+    return refused("cell {}: version {} of another server, limit {}", cell, newest, kHighestTold)
+        .of("version")
+        .beyond(newest, kHighestTold);
   return connection_->in_transaction([&](SQLite::Database& database) -> Status {
     change(database,
            "INSERT INTO versions_elsewhere (cell, newest) VALUES (?, ?) "

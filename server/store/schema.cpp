@@ -256,8 +256,8 @@ Status prepare_file(SQLite::Database& database, const std::string& path) {
 
 Status check_readable(SQLite::Database& database, const std::string& path) {
   if (auto owner = check_owner(database, path); !owner) return owner;
-  if (database.execAndGet("PRAGMA user_version").getInt() == kSchemaVersion && database.tableExists("audit_end"))
-    return {};
+  const bool has_all = database.tableExists("audit_end") && database.tableExists("versions_elsewhere");
+  if (database.execAndGet("PRAGMA user_version").getInt() == kSchemaVersion && has_all) return {};
   return refused("of an older schema, and cannot be written").in(path);
 }
 

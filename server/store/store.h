@@ -116,6 +116,9 @@ struct ReplicaRecord {
   bool operator==(const ReplicaRecord&) const = default;
 };
 
+/// The highest number of a version that another server is believed to have given.
+constexpr int kHighestTold = 1'000'000'000;
+
 /// What a cell is served with, as a replica tells it.
 struct VersionInForce {
   int version = 0;
@@ -248,7 +251,8 @@ class Store {
   /// Whether the cell's history has a model of this hash, with its text.
   [[nodiscard]] Result<bool> has_model(const std::string& cell, const std::string& hash) const;
   [[nodiscard]] Result<ReplicaView> replica_view() const;
-  /// The next version of the cell made here has a higher number than this one, which another server has given.
+  /// The next version of the cell made here has a higher number than this one, which another server has given. Refuses
+  /// one above kHighestTold.
   [[nodiscard]] Status number_after(const std::string& cell, int newest);
   /// `why`: for the audit trail, where the part changes.
   [[nodiscard]] Status keep_replica_record(const ReplicaRecord& record, const std::string& why);

@@ -59,16 +59,26 @@ JobQueue::Cancelled JobQueue::cancel(std::int64_t id) {
   std::stop_source source;
   {
     const MutexLock lock(mutex_);
-    for (auto cell = waiting_.begin(); cell != waiting_.end(); ++cell) {
-      if (std::erase_if(cell->second, [id](const WaitingJob& job) { return job.id == id; }) == 0) continue;
-      if (cell->second.empty()) waiting_.erase(cell);
-      return Cancelled::kRemoved;
-    }
+    if (is_removed(id)) return Cancelled::kRemoved;
     if (taken_ != id) return Cancelled::kUnknown;
     source = cancelling_;
   }
   source.request_stop();
   return Cancelled::kStopping;
+}
+
+bool JobQueue::remove(std::int64_t id) {
+  const MutexLock lock(mutex_);
+  return is_removed(id);
+}
+
+bool JobQueue::is_removed(std::int64_t id) {
+  for (auto cell = waiting_.begin(); cell != waiting_.end(); ++cell) {
+    if (std::erase_if(cell->second, [id](const WaitingJob& job) { return job.id == id; }) == 0) continue;
+    if (cell->second.empty()) waiting_.erase(cell);
+    return true;
+  }
+  return false;
 }
 
 std::size_t JobQueue::size() const {

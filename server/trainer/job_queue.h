@@ -45,6 +45,8 @@ class JobQueue {
     kUnknown    ///< it is not here
   };
   [[nodiscard]] Cancelled cancel(std::int64_t id);
+  /// Takes a job that waits out of the queue; false: it does not wait here.
+  [[nodiscard]] bool remove(std::int64_t id);
 
   [[nodiscard]] std::size_t size() const;
   /// How many of the cell's were asked for.
@@ -52,6 +54,7 @@ class JobQueue {
 
  private:
   [[nodiscard]] WaitingJob next() TRAMMEL_REQUIRES(mutex_);
+  [[nodiscard]] bool is_removed(std::int64_t id) TRAMMEL_REQUIRES(mutex_);
 
   mutable Mutex mutex_;
   Condition ready_;                                                                   // there are jobs

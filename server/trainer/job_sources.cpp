@@ -47,12 +47,14 @@ Result<std::vector<std::string>> earlier_sessions(const Store& store, const Stor
   }
   std::vector<std::string> earlier;
   for (auto batch = stored->rbegin(); batch != stored->rend(); ++batch) {
-    if (own.contains(batch->id) || !batch->quarantine.empty() || !learned->contains(batch->id)) continue;
-    const bool too_many =
-        rule.kind == SessionRule::Kind::kLast && earlier.size() + own.size() >= static_cast<std::size_t>(rule.count);
+    if (own.contains(batch->id) || !batch->quarantine.empty() || batch->pruned || !learned->contains(batch->id))
+      continue;
     const bool too_old =
         rule.kind == SessionRule::Kind::kDays && batch->accepted_at < newest - kSecondsPerDay * rule.count;
-    if (too_many || too_old || poses + batch->poses > max_poses) break;
+    if (too_old) continue;  // copies from another server do not come in the order of their times
+    const bool too_many =
+        rule.kind == SessionRule::Kind::kLast && earlier.size() + own.size() >= static_cast<std::size_t>(rule.count);
+    if (too_many || poses + batch->poses > max_poses) break;
     poses += batch->poses;
     earlier.push_back(batch->id);
   }

@@ -36,6 +36,12 @@ Status check_batch_id(const std::string& id) {
   return check_name(id, "batch");
 }
 
+/// When a batch was accepted, as another server tells it: not later than now.
+std::int64_t accepted_elsewhere(std::int64_t told) {
+  const std::int64_t now = unix_now();
+  return told > 0 ? std::min(told, now) : now;
+}
+
 Status check_most(const char* field, std::size_t asked, std::size_t most, const char* of_what) {
   if (asked <= most) return {};
   return failure(ErrorCode::kTooLarge, "{} {}, limit {}", asked, of_what, most).of(field).beyond(asked, most);
@@ -248,28 +254,33 @@ void Trainer::stop() {
 
 Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::string& batch_id, const std::string& csv,
                                      const std::string& request_id, const std::string& who) {
-  const auto cell = find_cell(cells(), cell_name);
+  StoredBatch batch{cell_name, batch_id, csv, "", request_id, unix_now()};
+  batch.who = who;
+  return take_in(std::move(batch));
+}
+
+Result<std::int64_t> Trainer::take_in(StoredBatch batch) {
+  const auto cell = find_cell(cells(), batch.cell);
   if (!cell) return tl::make_unexpected(cell.error());
-  if (auto valid = check_batch_id(batch_id); !valid) return tl::make_unexpected(valid.error());
-  StoredJob job;
-  job.cell = cell_name;
-  job.batch_ids = {batch_id};
-  job.created_at = unix_now();
-  const auto batch = received_batch({batch_id, csv, job.created_at}, **cell,
-                                    held_out_by_service(options_.validation_share, options_.seed));
-  if (!batch) return tl::make_unexpected(batch.error());
-  const int poses = static_cast<int>(batch->size());
-  if (poses > options_.max_poses) {
-    return failure(ErrorCode::kTooLarge, "batch {} has {} poses, limit {}", batch_id, poses, options_.max_poses)
+  if (auto valid = check_batch_id(batch.id); !valid) return tl::make_unexpected(valid.error());
+  const auto received = received_batch({batch.id, batch.csv, batch.accepted_at}, **cell,
+                                       held_out_by_service(options_.validation_share, options_.seed));
+  if (!received) return tl::make_unexpected(received.error());
+  batch.poses = static_cast<int>(received->size());
+  if (batch.poses > options_.max_poses) {
+    return failure(ErrorCode::kTooLarge, "batch {} has {} poses, limit {}", batch.id, batch.poses, options_.max_poses)
         .of("poses")
-        .beyond(poses, options_.max_poses);
+        .beyond(batch.poses, options_.max_poses);
   }
-  StoredBatch stored{cell_name, batch_id, csv, sha256_hex(csv), request_id, job.created_at, poses};
-  stored.who = who;
+  batch.hash = sha256_hex(batch.csv);
+  StoredJob job;
+  job.cell = batch.cell;
+  job.batch_ids = {batch.id};
+  job.created_at = unix_now();
 
   const MutexLock lock(submit_mutex_);
-  const bool repeated = store_.batch_record(cell_name, batch_id).has_value();
-  const auto accepted = store_.add_batch(stored, job);
+  const bool repeated = store_.batch_record(batch.cell, batch.id).has_value();
+  const auto accepted = store_.add_batch(batch, job);
   if (!accepted) return tl::make_unexpected(accepted.error());
   if (!repeated) enqueue(*accepted, false);
   return accepted->id;
@@ -572,23 +583,30 @@ void Trainer::end_jobs_done_elsewhere(const std::string& cell, const std::string
     };
     if (job.cell != cell || job.kind != JobKind::kTrain || job.batch_ids.empty()) continue;
     if (!std::all_of(job.batch_ids.begin(), job.batch_ids.end(), is_learned)) continue;
-    end_job_done_elsewhere(job, by + " has learned from it");
+    static_cast<void>(end_job_done_elsewhere(job, by + " has learned from it"));  // else a promotion trains once more
   }
 }
 
-void Trainer::end_job_done_elsewhere(const StoredJob& job, const std::string& what) {
-  if (queue_.cancel(job.id) != JobQueue::Cancelled::kRemoved) return;
-  if (!store_.set_job_done(job.id, what)) return;
+Status Trainer::end_job_done_elsewhere(const StoredJob& job, const std::string& what) {
+  const auto asked_for = was_asked_for(job);
+  if (!asked_for) return tl::make_unexpected(asked_for.error());
+  if (!queue_.remove(job.id)) return {};
+  if (const Status done = store_.set_job_done(job.id, what); !done) {
+    queue_.push_front({job.id, job.cell, *asked_for});  // as if nothing had been said
+    return done;
+  }
   JobProgress progress = progress_of(job);
   progress.stage = JobStage::kDone;
   progress.what = what;
   book_.report(progress);
+  return {};
 }
 
 Status Trainer::adopt_batch(const StoredBatch& there, const std::string& by) {
   if (!there.csv.empty()) {
-    if (const auto kept = submit(there.cell, there.id, there.csv, "", by); !kept)
-      return tl::make_unexpected(kept.error());
+    StoredBatch copy{there.cell, there.id, there.csv, "", "", accepted_elsewhere(there.accepted_at)};
+    copy.who = by;
+    if (const auto kept = take_in(std::move(copy)); !kept) return tl::make_unexpected(kept.error());
   }
   ChangeId change;
   change.who = by;
@@ -598,8 +616,7 @@ Status Trainer::adopt_batch(const StoredBatch& there, const std::string& by) {
   if (!here) return tl::make_unexpected(here.error());
   const auto job = store_.job(here->job);
   if (!job) return tl::make_unexpected(job.error());
-  end_job_done_elsewhere(*job, fmt::format("{}: {}", by, there.outcome));
-  return {};
+  return end_job_done_elsewhere(*job, fmt::format("{}: {}", by, there.outcome));
 }
 
 int Trainer::queued_jobs() const { return static_cast<int>(queue_.size()); }

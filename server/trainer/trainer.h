@@ -156,7 +156,11 @@ class Trainer {
  private:
   /// Ends the trainings that wait and would learn only what the models of the cell have learned.
   void end_jobs_done_elsewhere(const std::string& cell, const std::string& by);
-  void end_job_done_elsewhere(const StoredJob& job, const std::string& what);
+  /// One that runs goes on: it ends by itself, and puts nothing in force. Where the store does not take it the job
+  /// waits as before.
+  [[nodiscard]] Status end_job_done_elsewhere(const StoredJob& job, const std::string& what);
+  /// Checks the batch (its text, and when it was accepted first), stores it with its job, queues it.
+  [[nodiscard]] Result<std::int64_t> take_in(StoredBatch batch);
   /// Loads models in the background, tries a store again that cannot be written, and tells of other troubles than
   /// `told`.
   void keep_up(std::vector<std::string> told, const std::stop_token& stop);

@@ -121,6 +121,23 @@ TEST_F(StoreFaults, WhateverCallFailsWhatIsRefusedIsNotThereAndWhatIsAcceptedSta
   EXPECT_EQ(served(), 1);
 }
 
+TEST_F(StoreFaults, AStoreOfBeforeThatAFullDiskKeepsFromBeingTakenOnIsServedFromItsCopiesUntilThereIsRoom) {
+  test::FaultyDisk& disk = disk_.emplace();
+  open();
+  put_in_force(1);
+  store_.reset();
+  SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("DROP TABLE versions_elsewhere; DROP TABLE learned_elsewhere");
+  disk.refuse_writing(SQLITE_FULL);
+  open();
+  EXPECT_EQ(served(), 1);
+  EXPECT_TRUE(store_->state().why_not_written) << "it would be taken for readable, and what reads it would fail";
+  EXPECT_FALSE(store_->batches("cell-7"));
+  disk.work_again();
+  ASSERT_TRUE(store_->wait_until_writable({}));
+  EXPECT_TRUE(store_->batches("cell-7"));
+  EXPECT_EQ(served(), 1);
+}
+
 TEST_F(StoreFaults, ADiskThatFillsLaterIsTroubleUntilSomethingIsWrittenAgain) {
   test::FaultyDisk& disk = disk_.emplace();
   open();

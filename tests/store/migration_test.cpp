@@ -50,14 +50,40 @@ CREATE TABLE model_times (cell TEXT NOT NULL, version INTEGER NOT NULL, trained_
   PRIMARY KEY (cell, version), FOREIGN KEY (cell, version) REFERENCES models (cell, version)) WITHOUT ROWID;
 )sql";
 
+/// Beside that, before servers told each other what became of batches.
+constexpr const char* kBeforeElsewhere = R"sql(
+CREATE TABLE job_outcomes (job INTEGER PRIMARY KEY REFERENCES jobs (id), verdict TEXT NOT NULL, before_m REAL, after_m REAL,
+  limit_m REAL, code TEXT NOT NULL, why TEXT NOT NULL, next_step TEXT NOT NULL, peak_bytes INTEGER, processor_s REAL);
+CREATE TABLE job_releases (job INTEGER NOT NULL REFERENCES jobs (id), cell TEXT NOT NULL, batch TEXT NOT NULL,
+  PRIMARY KEY (job, cell, batch), FOREIGN KEY (cell, batch) REFERENCES batches (cell, id)) WITHOUT ROWID;
+CREATE TABLE health_checks (job INTEGER PRIMARY KEY REFERENCES jobs (id));
+CREATE TABLE activation_figures (number INTEGER PRIMARY KEY REFERENCES activations (number), before_m REAL, after_m REAL,
+  limit_m REAL, why TEXT NOT NULL);
+CREATE TABLE changes (number INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, asked TEXT NOT NULL,
+  version INTEGER NOT NULL, job INTEGER NOT NULL, made_at INTEGER NOT NULL);
+CREATE TABLE pruned (kind TEXT NOT NULL, cell TEXT NOT NULL, id TEXT NOT NULL, PRIMARY KEY (kind, cell, id)) WITHOUT ROWID;
+CREATE TABLE discarded (cell TEXT NOT NULL, batch TEXT NOT NULL, PRIMARY KEY (cell, batch),
+  FOREIGN KEY (cell, batch) REFERENCES batches (cell, id)) WITHOUT ROWID;
+CREATE TABLE store_identity (id TEXT NOT NULL);
+CREATE TABLE replica (one INTEGER PRIMARY KEY CHECK (one = 1), epoch INTEGER NOT NULL, writes INTEGER NOT NULL,
+  follows TEXT NOT NULL, told TEXT NOT NULL);
+CREATE TABLE audit (number INTEGER PRIMARY KEY, at INTEGER NOT NULL, who TEXT NOT NULL, cell TEXT NOT NULL,
+  what TEXT NOT NULL, subject TEXT NOT NULL, before TEXT NOT NULL, after TEXT NOT NULL, why TEXT NOT NULL,
+  request TEXT NOT NULL, hash_before TEXT NOT NULL, hash TEXT NOT NULL);
+CREATE TABLE audit_end (rows INTEGER NOT NULL, hash TEXT NOT NULL);
+INSERT INTO audit_end (rows, hash) VALUES (0, '');
+)sql";
+
 struct OldStore {
   const char* name;
   int schema;
   std::vector<const char*> statements;
 };
-const std::vector<OldStore> kOldStores = {{"version 1", 1, {kVersion1}},
-                                          {"version 2", 2, {kVersion1, kVersion2}},
-                                          {"version 2 with times", 2, {kVersion1, kVersion2, kTimesOnly}}};
+const std::vector<OldStore> kOldStores = {
+    {"version 1", 1, {kVersion1}},
+    {"version 2", 2, {kVersion1, kVersion2}},
+    {"version 2 with times", 2, {kVersion1, kVersion2, kTimesOnly}},
+    {"version 2 of servers that follow models only", 2, {kVersion1, kVersion2, kTimesOnly, kBeforeElsewhere}}};
 
 class MigrationTest : public testing::Test {
  protected:
@@ -117,6 +143,9 @@ TEST_F(MigrationTest, AStoreOfEveryEarlierSchemaIsTakenOnWithAllThatItHolds) {
       EXPECT_EQ(demand(store->unfinished_jobs()).size(), 1u);
       EXPECT_EQ(demand(store->recent_jobs("cell-7", 5)).size(), 3u);
       EXPECT_FALSE(demand(store->audit()).broken);
+      EXPECT_EQ(demand(store->batches("cell-7")).size(), 2u);
+      EXPECT_EQ(demand(store->batches_learned_from("cell-7")), (std::set<std::string>{"b1", "b2"}));
+      EXPECT_EQ(demand(store->replica_view()).newest.at("cell-7"), 2);
     }
     auto store = demand(Store::open(path));
     ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell_, 50), 3, true, "made")) << "and it goes on";

@@ -8,6 +8,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <thread>
 
 #include "server/base/hash.h"
@@ -237,6 +238,14 @@ TEST_F(FollowedBatch, WhatTheWriterDiscardedIsDiscardedHereForEver) {
   EXPECT_TRUE(here().discarded);
 }
 
+TEST_F(FollowedBatch, WhatTheWriterDiscardedWithoutAWordIsKeptOutAllTheSame) {
+  there_.discarded = true;
+  ASSERT_TRUE(store_->take_over_batch(there_, by_));
+  EXPECT_TRUE(here().discarded);
+  EXPECT_EQ(here().quarantine, "discarded");
+  EXPECT_EQ(store_->audit()->rows.back().what, "discard");
+}
+
 TEST_F(FollowedBatch, WhatTheWriterLearnedFromIsLearnedFromHere) {
   EXPECT_FALSE(here().learned);
   there_.learned = true;
@@ -283,6 +292,26 @@ TEST_F(StoreTest, ANumberThatAnotherServerGaveIsNotGivenAgain) {
   EXPECT_EQ(add_model(2), 5);
   EXPECT_EQ(add_model(3), 6);
   EXPECT_EQ(store_->replica_view()->newest.at("cell-7"), 6);
+}
+
+TEST_F(StoreTest, ANumberThatNoServerCanHaveGivenIsNotBelieved) {
+  for (const int claimed : {std::numeric_limits<int>::max(), kHighestTold + 1})
+    EXPECT_EQ(store_->number_after("cell-7", claimed).error().code, ErrorCode::kRefused);
+  const auto model = test::nominal_model(cell_, 1);
+  const VersionInForce claimed{std::numeric_limits<int>::max(), model.provenance().hash};
+  EXPECT_EQ(store_->adopt("cell-7", claimed, &model, {}).value(), 1);
+  ASSERT_TRUE(store_->number_after("cell-7", kHighestTold));
+  EXPECT_EQ(add_model(2), kHighestTold + 1);
+}
+
+TEST_F(StoreTest, WhereNoNumberIsLeftAModelIsRefusedAndNoneGetsAnotherOnesNumber) {
+  EXPECT_EQ(add_model(1), 1);
+  store_.reset();
+  SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("UPDATE models SET version = 2147483647");
+  open();
+  const auto one_more = store_->add_model("cell-7", test::nominal_model(cell_, 2), 0, false, "made");
+  ASSERT_FALSE(one_more);
+  EXPECT_EQ(one_more.error().code, ErrorCode::kRefused);
 }
 
 TEST_F(StoreTest, TakesAFileOfTheFirstSchemaOn) {

@@ -12,8 +12,8 @@ namespace trammel {
 namespace {
 
 constexpr std::chrono::milliseconds kLook{250};  // at what the store has changed
+constexpr std::chrono::seconds kLastWait{1};     // of a server that stops
 constexpr std::chrono::seconds kTryAgain{5};     // with a follower that did not say that it has a batch
-constexpr std::size_t kRemembered = 100'000;     // answers; then all are asked once more
 
 /// All of what a follower is told of a batch beside its text.
 std::string standing_of(const StoredBatch& batch) {
@@ -29,7 +29,30 @@ wire::BatchCopy copy_of(const StoredBatch& batch) {
   copy.discarded(batch.discarded);
   copy.learned(batch.learned);
   copy.outcome(cut(batch.outcome, wire::MAX_SENTENCE));
+  copy.accepted_at_unix_s(batch.accepted_at);
   return copy;
+}
+
+/// Empty where it was pruned or is damaged: what became of it is told all the same.
+std::string text_of(const Store& store, const StoredBatch& batch) {
+  auto whole = store.batch(batch.cell, batch.id);
+  return whole ? std::move(whole->csv) : std::string();
+}
+
+/// What another server's answer means here.
+Status outcome_of(const wire::BatchCopied& answer) {
+  switch (answer.result()) {
+    case wire::RESULT_OK:
+      return {};
+    case wire::RESULT_NOT_FOUND:
+      return failure(ErrorCode::kNotFound, "{}", answer.why());
+    case wire::RESULT_BUSY:
+      return failure(ErrorCode::kBusy, "{}", answer.why());
+    case wire::RESULT_INTERNAL:
+      return failure(ErrorCode::kInternal, "{}", answer.why());
+    default:
+      return failure(ErrorCode::kRefused, "{}", answer.why());
+  }
 }
 
 }  // namespace
@@ -46,15 +69,16 @@ BatchSender::BatchSender(std::string server, const ReplicaOptions& options, cons
 
 BatchSender::~BatchSender() { stop(); }
 
-void BatchSender::start(wire::dds::DataWriter& writer) {
+void BatchSender::start(Send send) {
   {
-    const MutexLock lock(mutex_);
-    writer_ = &writer;
+    const MutexLock sending(sending_);
+    send_ = std::move(send);
   }
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
 void BatchSender::stop() {
+  copies_.close(BatchCopies::Time::clock::now() + kLastWait);
   thread_.request_stop();
   if (thread_.joinable()) thread_.join();
 }
@@ -66,9 +90,15 @@ void BatchSender::set_options(const ReplicaOptions& options) {
 }
 
 void BatchSender::set_writes(bool writes) {
+  if (writes) copies_.doubt();
   const MutexLock lock(mutex_);
   writes_ = writes;
   look_again_ = true;
+}
+
+bool BatchSender::sends() const {
+  const MutexLock lock(mutex_);
+  return writes_ && options_.batches_to_followers;
 }
 
 void BatchSender::look_again() {
@@ -79,11 +109,17 @@ void BatchSender::look_again() {
   changed_.notify_all();
 }
 
+void BatchSender::look_again(const std::string& participant) {
+  copies_.doubt(participant);
+  look_again();
+}
+
+void BatchSender::answered(const std::string& participant, const wire::BatchCopied& answer) {
+  copies_.answered(participant, answer.number(), outcome_of(answer));
+}
+
 void BatchSender::bring(const std::string& cell, const std::string& batch_id) {
-  {
-    const MutexLock lock(mutex_);
-    if (!sends()) return;
-  }
+  if (!sends()) return;
   const auto batch = store_.batch_record(cell, batch_id);
   if (!batch) return;  // the thread finds it, where it is there
   const std::map<std::string, Error> wrong = bring(followers_(cell), *batch);
@@ -96,60 +132,49 @@ void BatchSender::bring(const std::string& cell, const std::string& batch_id) {
 }
 
 std::map<std::string, Error> BatchSender::bring(const std::map<std::string, std::string>& followers,
-                                                const StoredBatch& batch) {
-  const std::string standing = standing_of(batch);
-  std::map<std::string, Error> wrong;
-  std::map<std::string, bool> have_text;  // of those that are to be told
+                                                const StoredBatch& seen) {
+  if (!sends()) return {};
+  std::map<std::string, BatchCopies::Key> told;
+  for (const auto& [follower, participant] : followers) told[follower] = {participant, seen.cell, seen.id};
+  tell(told, seen);
   std::chrono::duration<double> patience{};
-  wire::dds::DataWriter* writer = nullptr;
   {
     const MutexLock lock(mutex_);
-    writer = writer_;
-    if (said_.size() > kRemembered) said_.clear();
     patience = std::chrono::duration<double>(options_.copy_timeout_s);
-    for (const auto& [follower, participant] : followers) {
-      const auto said = said_.find({participant, batch.cell, batch.id});
-      const bool has_text = said != said_.end() && !said->second.refused;
-      if (said == said_.end() || said->second.standing != standing) {
-        have_text[follower] = has_text;
-      } else if (said->second.refused) {
-        wrong[follower] = *said->second.refused;
-      }
-    }
-  }
-  if (have_text.empty()) return wrong;
-
-  const auto lacks_text = [](const auto& follower) { return !follower.second; };
-  std::string text;
-  if (!batch.pruned && std::any_of(have_text.begin(), have_text.end(), lacks_text)) {
-    auto stored = store_.batch(batch.cell, batch.id);
-    if (stored) text = std::move(stored->csv);
-    if (!stored) std::erase_if(have_text, lacks_text);  // a text that cannot be read is said elsewhere
-  }
-  wire::BatchCopy copy = copy_of(batch);
-  copy.server(server_);
-  std::vector<std::string> told;
-  for (const auto& [follower, has_text] : have_text) told.push_back(follower);
-  const auto numbers = copies_.expect(told);
-  for (const auto& [follower, number] : numbers) {
-    copy.to(follower);
-    copy.number(number);
-    copy.csv(have_text.at(follower) ? std::string() : text);
-    writer->write(&copy);
   }
   const auto until =
       BatchCopies::Time::clock::now() + std::chrono::duration_cast<BatchCopies::Time::duration>(patience);
-  std::map<std::string, Error> answers = copies_.wait(numbers, until);
-  const MutexLock lock(mutex_);
-  for (const std::string& follower : told) {
-    const auto answer = answers.find(follower);
-    const bool has_taken = answer == answers.end() || (batch.pruned && answer->second.code == ErrorCode::kNotFound);
-    if (!has_taken) wrong[follower] = answer->second;
-    if (!has_taken && answer->second.code == ErrorCode::kUnreachable) continue;
-    said_[{followers.at(follower), batch.cell, batch.id}] = {standing,
-                                                             has_taken ? std::nullopt : std::optional(answer->second)};
-  }
+  std::map<std::string, Error> wrong = copies_.wait(told, until);
+  // Nobody lacks what nobody has any more.
+  if (seen.pruned) std::erase_if(wrong, [](const auto& one) { return one.second.code == ErrorCode::kNotFound; });
   return wrong;
+}
+
+void BatchSender::tell(const std::map<std::string, BatchCopies::Key>& followers, const StoredBatch& seen) {
+  const MutexLock sending(sending_);
+  const bool all_have_it =
+      std::all_of(followers.begin(), followers.end(), [&, standing = standing_of(seen)](auto& one) {
+        return copies_.lacks(one.second, standing) == BatchCopies::Lacks::kNothing;
+      });
+  if (all_have_it) return;
+  if (const auto batch = store_.batch_record(seen.cell, seen.id)) send_to(followers, *batch);
+}
+
+void BatchSender::send_to(const std::map<std::string, BatchCopies::Key>& followers, const StoredBatch& batch) {
+  const std::string standing = standing_of(batch);
+  std::optional<std::string> text;
+  wire::BatchCopy copy = copy_of(batch);
+  copy.server(server_);
+  for (const auto& [follower, key] : followers) {
+    const BatchCopies::Lacks lacks = copies_.lacks(key, standing);
+    if (lacks == BatchCopies::Lacks::kNothing) continue;
+    const bool lacks_text = lacks == BatchCopies::Lacks::kText;
+    if (lacks_text && !text) text = text_of(store_, batch);
+    copy.to(follower);
+    copy.number(copies_.tell(key, standing));
+    copy.csv(lacks_text ? *text : std::string());
+    send_(copy);
+  }
 }
 
 void BatchSender::run(const std::stop_token& stop) {
@@ -160,10 +185,10 @@ void BatchSender::run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     const std::int64_t changes = store_.changes_made().value_or(seen);
     const bool is_due = BatchCopies::Time::clock::now() >= try_again;
-    bool sends_now = false, look = false;
+    const bool sends_now = sends();
+    bool look = false;
     {
       const MutexLock lock(mutex_);
-      sends_now = sends();
       look = sends_now && (changes != seen || is_due || look_again_);
       look_again_ = false;
     }
@@ -186,22 +211,25 @@ void BatchSender::run(const std::stop_token& stop) {
 
 BatchSender::Missing BatchSender::bring_all(const std::stop_token& stop) {
   Missing missing;
-  std::set<std::string> silent;
+  std::set<std::string> participants, left_out;  // left out: for this round
   for (const auto& [cell, description] : trainer_.cells()) {
     std::map<std::string, std::string> followers = followers_(cell);
-    std::erase_if(followers, [&](const auto& follower) { return silent.contains(follower.first); });
+    for (const auto& [follower, participant] : followers) participants.insert(participant);
+    std::erase_if(followers, [&](const auto& follower) { return left_out.contains(follower.first); });
     if (followers.empty()) continue;
     for (const StoredBatch& batch : store_.batches(cell).value_or(std::vector<StoredBatch>())) {
       if (stop.stop_requested()) return missing;
       for (const auto& [follower, why] : bring(followers, batch)) {
         missing.why.try_emplace(follower, sentence(why));
-        if (why.code != ErrorCode::kUnreachable) continue;  // what it refuses keeps none of the others from it
-        silent.insert(follower);
+        missing.try_again = missing.try_again || passes(why);
+        // Silent, or its disk is full: that holds for all. What it refuses keeps none of the others from it.
+        if (why.code != ErrorCode::kUnreachable && why.code != ErrorCode::kBusy) continue;
+        left_out.insert(follower);
         followers.erase(follower);
-        missing.try_again = true;
       }
     }
   }
+  copies_.forget_all_but(participants);
   return missing;
 }
 

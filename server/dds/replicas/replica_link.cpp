@@ -26,6 +26,7 @@ StoredBatch batch_in(const wire::BatchCopy& copy) {
   batch.discarded = copy.discarded();
   batch.learned = copy.learned();
   batch.outcome = copy.outcome();
+  batch.accepted_at = copy.accepted_at_unix_s();
   return batch;
 }
 
@@ -54,7 +55,7 @@ Result<std::unique_ptr<ReplicaLink>> ReplicaLink::open(wire::dds::DomainParticip
     return tl::make_unexpected(opened.error());
   ReplicaLink* self = link.get();
   link->replicas_thread_ = std::jthread([self](const std::stop_token& stop) { self->run(stop); });
-  link->sender_.start(*link->copy_writer_);
+  link->sender_.start([writer = link->copy_writer_](wire::BatchCopy& copy) { writer->write(&copy); });
   return link;
 }
 
@@ -166,7 +167,7 @@ void ReplicaLink::on_status(const wire::ReplicaStatus* status, const std::string
     }
   }
   changed_.notify_all();
-  if (is_other) sender_.look_again();
+  if (is_other) sender_.look_again(participant);
 }
 
 void ReplicaLink::on_snapshot(const wire::ModelSnapshot* snapshot) {
@@ -209,12 +210,7 @@ void ReplicaLink::on_copied(const wire::BatchCopied* copied, const std::string& 
     const MutexLock lock(mutex_);
     if (!is_its_own(copied->server().to_string(), participant)) return;
   }
-  const bool is_there = copied->result() != wire::RESULT_NOT_FOUND;
-  const Status outcome =
-      copied->result() == wire::RESULT_OK
-          ? Status()
-          : Status(failure(is_there ? ErrorCode::kRefused : ErrorCode::kNotFound, "{}", copied->why()));
-  sender_.answered(copied->server().to_string(), copied->number(), outcome);
+  sender_.answered(participant, *copied);
 }
 
 std::optional<ChangesElsewhere> ReplicaLink::changes_elsewhere() const {
@@ -276,6 +272,7 @@ void ReplicaLink::step() {
   take_on(decision, *view->record);
   set_trouble("role", decision.trouble);
   keep_copies();
+  number_after(there, *view);
   if (decision.leader != nullptr) follow(*decision.leader, *view);
   if (decision.record.writes) set_trouble("follow", "");
   view = store_.replica_view();
@@ -323,18 +320,28 @@ void ReplicaLink::set_may_change(bool may) {
     const MutexLock lock(mutex_);
     may = may && role_.has_looked(Clock::now());
     if (may == may_change_) return;
+  }
+  // Copies first and last: no change is acknowledged without them.
+  if (may) sender_.set_writes(true);
+  {
+    const MutexLock lock(mutex_);
     may_change_ = may;
   }
   trainer_.set_decides(may);
-  sender_.set_writes(may);
+  if (!may) sender_.set_writes(false);
+}
+
+void ReplicaLink::number_after(const std::vector<OtherReplica>& others, const ReplicaView& view) {
+  for (const OtherReplica& other : others) {
+    for (const auto& [cell, newest] : other.newest) {
+      const auto known = view.newest.find(cell);
+      if (newest > (known == view.newest.end() ? 0 : known->second))
+        static_cast<void>(store_.number_after(cell, newest));  // else with the next step
+    }
+  }
 }
 
 void ReplicaLink::follow(const OtherReplica& leader, const ReplicaView& view) {
-  for (const auto& [cell, newest] : leader.newest) {
-    const auto known = view.newest.find(cell);
-    if (newest > (known == view.newest.end() ? 0 : known->second))
-      static_cast<void>(store_.number_after(cell, newest));  // else with the next step
-  }
   std::string wrong;
   bool has_all = true;
   for (const auto& [cell, wanted] : leader.cells) {
@@ -427,8 +434,9 @@ void ReplicaLink::keep_copies() {
     answer.server(server_);
     answer.to(from);
     answer.number(copy.number());
+    // Not yet, or no longer: that passes.
     const Status kept = from == leader ? trainer_.adopt_batch(batch_in(copy), from)
-                                       : Status(failure(ErrorCode::kConflict, "{} does not follow {}", server_, from));
+                                       : Status(failure(ErrorCode::kBusy, "{} does not follow {}", server_, from));
     if (!kept) {
       answer.result(to_wire(kept.error().code));
       answer.why(cut(sentence(kept.error()), wire::MAX_SENTENCE));

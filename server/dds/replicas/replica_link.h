@@ -52,6 +52,8 @@ class ReplicaLink {
   void changed() { wake(); }
   /// The trainer serves more cells: what other servers have of them is asked for again. Call it from one thread.
   [[nodiscard]] Status cells_added();
+  /// From now on no request waits for a follower longer than a second. Call it before you wait for the requests.
+  void stop_copying() { sender_.stop(); }
   /// The server file was read again.
   void set_options(const ReplicaOptions& options);
 
@@ -96,6 +98,8 @@ class ReplicaLink {
   [[nodiscard]] RoleDecision decide(const ReplicaRecord& record, const std::vector<OtherReplica>& others);
   void take_on(const RoleDecision& decision, const ReplicaRecord& before);
   void set_may_change(bool may);
+  /// What is made here later gets higher numbers than any that they know of.
+  void number_after(const std::vector<OtherReplica>& others, const ReplicaView& view);
   /// Puts in force what the leader has; returns what could not be, by cell.
   void follow(const OtherReplica& leader, const ReplicaView& view);
   [[nodiscard]] Status follow_cell(const std::string& cell, const VersionInForce& wanted, const std::string& leader);
