@@ -15,6 +15,7 @@ install(PROGRAMS deploy/security/keys DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/tr
 install(FILES deploy/security/README.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/trammeld RENAME security.md COMPONENT trammeld)
 install(FILES deploy/watching/alerts.yml deploy/watching/dashboard.json deploy/watching/prometheus.yml deploy/watching/README.md
   DESTINATION ${CMAKE_INSTALL_DATADIR}/trammel/watching COMPONENT trammeld)
+install(FILES deploy/discovery-server.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/trammel COMPONENT trammeld)
 install(FILES deploy/trammeld.service DESTINATION lib/systemd/system COMPONENT trammeld)
 
 # libtrammel: find_package(Trammel), Trammel::trammel.

@@ -121,7 +121,7 @@ class Gate final : public rtps::ChainingTransport {
     const auto passed = guard_ ? guard_->check(Bytes(buffer, size), socket_of(there)) : Bytes(buffer, size);
     if (!passed) return;
     const Bytes message = *passed;
-    if (is_of_another_domain(message, domain_)) return;
+    if (domain_ && is_of_another_domain(message, *domain_)) return;
     const bool own = heard_ && is_own(message);
     if (own && is_to_be_lost(message)) return;
     next->OnDataReceived(message.data(), static_cast<std::uint32_t>(message.size()), here, there);
@@ -157,7 +157,7 @@ class Gate final : public rtps::ChainingTransport {
   }
 
   std::unique_ptr<GateDescriptor> configuration_;
-  const std::uint32_t domain_;
+  const std::optional<std::uint32_t> domain_;
   const std::shared_ptr<HeardOfItself> heard_;
   const std::unique_ptr<Guard> guard_;
   HeartbeatPace pace_;
@@ -170,18 +170,21 @@ class Gate final : public rtps::ChainingTransport {
 
 class GateDescriptor final : public rtps::ChainingTransportDescriptor {
  public:
-  GateDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> below, std::uint32_t of,
-                 std::shared_ptr<HeardOfItself> counted, std::shared_ptr<DropCounts> dropped_counts)
+  GateDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> below, std::optional<std::uint32_t> of,
+                 std::shared_ptr<HeardOfItself> counted, std::shared_ptr<DropCounts> dropped_counts,
+                 std::vector<Relay> believed)
       : ChainingTransportDescriptor(std::move(below)),
         domain(of),
         heard(std::move(counted)),
-        dropped(std::move(dropped_counts)) {}
+        dropped(std::move(dropped_counts)),
+        relays(std::move(believed)) {}
 
   rtps::TransportInterface* create_transport() const override { return new Gate(*this); }
 
-  std::uint32_t domain;
+  std::optional<std::uint32_t> domain;  // none: all domains
   std::shared_ptr<HeardOfItself> heard;
   std::shared_ptr<DropCounts> dropped;  // null: no guard
+  std::vector<Relay> relays;
 };
 
 Gate::Gate(const GateDescriptor& descriptor)
@@ -189,9 +192,9 @@ Gate::Gate(const GateDescriptor& descriptor)
       configuration_(std::make_unique<GateDescriptor>(descriptor)),
       domain_(descriptor.domain),
       heard_(descriptor.heard),
-      guard_(descriptor.dropped
-                 ? std::make_unique<Guard>(static_cast<std::uint32_t>(kMaxTextSample), descriptor.dropped)
-                 : nullptr) {}
+      guard_(descriptor.dropped ? std::make_unique<Guard>(static_cast<std::uint32_t>(kMaxTextSample),
+                                                          descriptor.dropped, descriptor.relays)
+                                : nullptr) {}
 
 rtps::TransportDescriptorInterface* Gate::get_configuration() { return configuration_.get(); }
 
@@ -212,7 +215,14 @@ bool is_announcement(std::span<const unsigned char> message) {
 std::shared_ptr<rtps::TransportDescriptorInterface> with_domain_gate(
     std::shared_ptr<rtps::TransportDescriptorInterface> below, std::uint32_t domain,
     std::shared_ptr<HeardOfItself> heard, std::shared_ptr<DropCounts> dropped) {
-  return std::make_shared<GateDescriptor>(std::move(below), domain, std::move(heard), std::move(dropped));
+  return std::make_shared<GateDescriptor>(std::move(below), domain, std::move(heard), std::move(dropped),
+                                          std::vector<Relay>());
+}
+
+std::shared_ptr<rtps::TransportDescriptorInterface> with_relay_guard(
+    std::shared_ptr<rtps::TransportDescriptorInterface> below, std::vector<Relay> relays) {
+  return std::make_shared<GateDescriptor>(std::move(below), std::nullopt, nullptr, std::make_shared<DropCounts>(),
+                                          std::move(relays));
 }
 
 }  // namespace trammel::wire

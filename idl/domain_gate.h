@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "idl/guard/dropped.h"
 
@@ -16,6 +17,8 @@
 /// domain of an announcement. So this gate, a transport below the library, reads the domain in each announcement and
 /// drops those of other domains. The library ignores participants that it has not discovered.
 namespace trammel::wire {
+
+struct Relay;  // guard/relay.h
 
 /// The user data of our participants: `trammel.domain=5`. Other participants may send it too. Most DDS libraries,
 /// Cyclone among them, send the standard parameter PID_DOMAIN_ID instead; Fast DDS 2.9 does not.
@@ -42,5 +45,9 @@ struct HeardOfItself {
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> with_domain_gate(
     std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> below, std::uint32_t domain,
     std::shared_ptr<HeardOfItself> heard, std::shared_ptr<DropCounts> dropped);
+
+/// `below` with a guard in front that lets `relays` announce others, of any domain.
+[[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> with_relay_guard(
+    std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> below, std::vector<Relay> relays);
 
 }  // namespace trammel::wire

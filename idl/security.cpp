@@ -15,6 +15,7 @@
 #include <ctime>
 #include <memory>
 #include <optional>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -161,6 +162,19 @@ Status check_permissions(const Folder& folder, const std::string& subject, const
   return {};
 }
 
+/// The role in `<grant name="line-3: replica">`, as deploy/security/keys writes it.
+std::string role_in(const std::string& permissions) {
+  constexpr std::string_view kBegin = "<grant name=\"";
+  const std::size_t begin = permissions.find(kBegin);
+  if (begin == std::string::npos) return {};
+  const std::size_t end = permissions.find('"', begin + kBegin.size());
+  const std::size_t colon = permissions.find(": ", begin);
+  if (end == std::string::npos || colon >= end) return {};
+  const std::string role = permissions.substr(colon + 2, end - colon - 2);
+  constexpr std::array<std::string_view, 5> known{"replica", "observer", "cam", "metrologist", "engineer"};
+  return std::find(known.begin(), known.end(), role) == known.end() ? std::string() : role;
+}
+
 struct NamePart {
   std::string key, value;
 };
@@ -250,7 +264,15 @@ Result<Security> read_security(const std::string& path) {
   const std::string subject = subject_of(**certificate);
   if (const Status fine = check_permissions(folder, subject, *permissions); !fine)
     return tl::make_unexpected(fine.error());
-  return Security{path, subject};
+  return Security{path, subject, role_in(*permissions)};
+}
+
+Status check_serves(const Security& security) {
+  if (security.role.empty() || security.role == "replica") return {};
+  return Folder(security.folder)
+      .wrong("permissions.p7s",
+             fmt::format("{} has the role {}, and a service needs the role replica", security.subject, security.role))
+      .next("keys issue PLANT replica NAME makes such a folder; see deploy/security/README.md");
 }
 
 }  // namespace trammel::wire

@@ -12,6 +12,7 @@ namespace trammel::wire {
 struct Security {
   std::string folder;
   std::string subject;  ///< of the certificate, as RFC 2253 writes it: `CN=line-3,O=Trammel`
+  std::string role;     ///< that deploy/security/keys gave it; empty: its permissions are not from there
 };
 
 /// Looks at the files before the library does, which gives no reasons. Refuses (kRefused) a file that is missing or
@@ -19,6 +20,10 @@ struct Security {
 /// authority, was revoked or has another key, and rules that were not signed by the authority of the permissions, or
 /// whose permissions are for another subject, have expired or are not valid yet.
 [[nodiscard]] Result<Security> read_security(const std::string& folder);
+
+/// Whether a service may have these permissions: those of another role than `replica` let it answer nothing, and the
+/// library would say so of one of its topics only. Permissions that are not from deploy/security/keys may be anything.
+[[nodiscard]] Status check_serves(const Security& security);
 
 /// The subject of the certificate that a participant has shown, as RFC 2253 writes it. `claimed`: what its identity
 /// token says (`dds.cert.sn`), which nobody has checked. `participant`: the 12 octets of its GUID, which begin with a

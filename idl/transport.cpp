@@ -1,100 +1,26 @@
 #include "idl/transport.h"
 
-#include <arpa/inet.h>
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
-#include <fastrtps/attributes/LibrarySettingsAttributes.h>
-#include <fastrtps/utils/IPLocator.h>
-#include <fastrtps/xmlparser/XMLProfileManager.h>
-#include <netinet/in.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cstdlib>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
-#include <fastdds/dds/log/Log.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <memory>
-#include <mutex>
-#include <sstream>
 
-#include "idl/quiet_library.h"
-#include "server/base/line_output.h"
+#include "idl/limits.h"
 
 namespace trammel::wire {
 namespace {
 
 namespace rtps = eprosima::fastrtps::rtps;
-using eprosima::fastrtps::Duration_t;
 
-constexpr std::uint32_t kSocketBuffer = 4u << 20;
 // Bytes. On a line a datagram is one frame of an Ethernet: of a larger one a lost frame takes all others with it, so
 // that a line that loses every twentieth lets hardly any of 64 kB through. The handshake of DDS-Security is not sent in
 // parts: it holds certificate and permissions.
 constexpr std::uint32_t kDatagramOfALine = 1400;
 constexpr std::uint32_t kSecuredDatagramOfALine = 16384;
 constexpr int kReplicaDepth = 16;
-constexpr std::uint32_t kPortTries = 2000;
 // Until a reader has confirmed everything: a lost reply is to be missed at once. A state has readers in every client.
 constexpr std::chrono::milliseconds kHeartbeat{10}, kStateHeartbeat{200};
-
-Duration_t to_duration(std::chrono::milliseconds time) {
-  return {static_cast<std::int32_t>(time.count() / 1000), static_cast<std::uint32_t>(time.count() % 1000) * 1'000'000u};
-}
-
-/// The library's errors to standard error, which nobody may read any more: the library does not wait for that.
-class LibraryErrors final : public dds::LogConsumer {
- public:
-  void Consume(const dds::Log::Entry& entry) override {
-    if (QuietLibrary::lives()) return;
-    std::ostringstream line;
-    print_timestamp(line, entry, false);
-    print_header(line, entry, false);
-    print_message(line, entry, false);
-    print_context(line, entry, false);
-    print_new_line(line, false);
-    output_.write(line.str());
-  }
-
- private:
-  LineOutput output_{STDERR_FILENO};
-};
-
-void set_up_process() {
-  static std::once_flag once;
-  std::call_once(once, [] {
-    // Both would silently change how participants find each other.
-    unsetenv("ROS_DISCOVERY_SERVER");
-    unsetenv("FASTRTPS_DEFAULT_PROFILES_FILE");
-    dds::Log::SetVerbosity(dds::Log::Kind::Error);
-    dds::Log::ClearConsumers();
-    dds::Log::RegisterConsumer(std::make_unique<LibraryErrors>());
-    // Where a test has server and clients in one process, they too talk over UDP.
-    eprosima::fastrtps::LibrarySettingsAttributes settings;
-    settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
-    eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
-  });
-}
-
-Status check_address(const std::string& address) {
-  sockaddr_in name{};
-  name.sin_family = AF_INET;
-  if (inet_pton(AF_INET, address.c_str(), &name.sin_addr) != 1) {
-    return failure(ErrorCode::kUsage, "address `{}` is not an IPv4 address", address);
-  }
-  const std::vector<std::string> own = own_addresses();
-  if (std::find(own.begin(), own.end(), address) == own.end()) {
-    return failure(ErrorCode::kUsage, "address {} is not one of this host's, or its interface is down", address)
-        .next(fmt::format("it has {}", fmt::join(own, ", ")));
-  }
-  return {};
-}
-
-rtps::Locator_t locator(const std::string& address, std::uint16_t port) {
-  rtps::Locator_t result;
-  rtps::IPLocator::createLocator(LOCATOR_KIND_UDPv4, address, port, result);
-  return result;
-}
 
 /// The builtin plugins of DDS-Security. The governance says what is signed and encrypted.
 void set_security(dds::PropertyPolicyQos& properties, const Security& security) {
@@ -150,37 +76,18 @@ void set_reader_times(dds::DataReaderQos& qos) {
 
 }  // namespace
 
-void ParticipantDeleter::operator()(dds::DomainParticipant* participant) const {
-  participant->delete_contained_entities();
-  dds::DomainParticipantFactory::get_instance()->delete_participant(participant);
-}
-
 Result<ParticipantPtr> make_participant(const ParticipantOptions& options, dds::DomainParticipantListener* discovery) {
-  set_up_process();
-  if (const Status usable = check_address(options.address); !usable) return tl::make_unexpected(usable.error());
-
-  const auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-  udp->interfaceWhiteList = {options.address};
-  udp->sendBufferSize = kSocketBuffer;
-  udp->receiveBufferSize = kSocketBuffer;
+  const auto udp = udp_on(options.address);
+  if (!udp) return tl::make_unexpected(udp.error());
   if (!options.address.starts_with("127."))
-    udp->maxMessageSize = options.security ? kSecuredDatagramOfALine : kDatagramOfALine;
+    (*udp)->maxMessageSize = options.security ? kSecuredDatagramOfALine : kDatagramOfALine;
 
-  dds::DomainParticipantQos qos;
+  dds::DomainParticipantQos qos =
+      participant_qos(with_domain_gate(*udp, options.domain, options.heard_of_itself, options.dropped), options.address,
+                      options.listen_port);
   qos.name(options.name);
-  const std::string mark = domain_mark(options.domain);
-  qos.user_data().setValue(std::vector<unsigned char>(mark.begin(), mark.end()));
-  qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports = {with_domain_gate(udp, options.domain, options.heard_of_itself, options.dropped)};
-  qos.transport().send_socket_buffer_size = kSocketBuffer;
-  qos.transport().listen_socket_buffer_size = kSocketBuffer;
+  set_user_data(qos, domain_mark(options.domain));
   auto& builtin = qos.wire_protocol().builtin;
-  builtin.discovery_config.leaseDuration = to_duration(kLease);
-  builtin.discovery_config.leaseDuration_announcementperiod = to_duration(kAnnouncement);
-  // Each participant of a host takes the next free ports. With the library's 100 tries the 125th has none, and is deaf.
-  builtin.mutation_tries = kPortTries;
-  // A list of its own, even without a port, keeps the participant from joining the default multicast group.
-  builtin.metatrafficUnicastLocatorList.push_back(locator(options.address, options.listen_port));
   for (const std::uint16_t port : options.peer_ports)
     builtin.initialPeersList.push_back(locator(options.address, port));
   for (const HostPort& peer : options.peers) builtin.initialPeersList.push_back(locator(peer.address, peer.port));

@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "idl/domain_gate.h"
+#include "idl/participant.h"
 #include "idl/safe_type.h"
 #include "idl/security.h"
 #include "idl/topics.h"
@@ -29,8 +30,6 @@
 
 /// How samples travel: one participant set-up and one set of QoS for the server and all clients.
 namespace trammel::wire {
-
-namespace dds = eprosima::fastdds::dds;
 
 struct ParticipantOptions {
   std::string name;
@@ -46,14 +45,8 @@ struct ParticipantOptions {
   std::optional<Security> security = {};  ///< who it is, and what it may do; empty: everybody is believed
 };
 
-struct ParticipantDeleter {
-  void operator()(dds::DomainParticipant* participant) const;  ///< with all that it contains
-};
-using ParticipantPtr = std::unique_ptr<dds::DomainParticipant, ParticipantDeleter>;
-
-/// UDPv4 on one interface, unicast only. Ignores the environment and other domains. Refuses an address that this host
-/// does not have now: such a participant would receive nothing even after the interface comes up. One participant per
-/// process. `discovery` outlives it and gets discovery events only.
+/// UDPv4 on one interface, as udp_on(). Ignores other domains. One per process. `discovery` outlives it and gets
+/// discovery events only.
 [[nodiscard]] Result<ParticipantPtr> make_participant(const ParticipantOptions& options,
                                                       dds::DomainParticipantListener* discovery = nullptr);
 

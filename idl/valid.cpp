@@ -319,6 +319,7 @@ void shape(CdrWalk& walk, Of<BatchCopy>) {
   walk.flag("discarded");
   walk.flag("learned");
   sentence(walk, "outcome");
+  walk.wides(1);
 }
 
 void shape(CdrWalk& walk, Of<BatchCopied>) {

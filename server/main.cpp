@@ -85,13 +85,13 @@ int refuse_start(std::vector<Error> problems) {
   return refuse(all);
 }
 
-/// Prints what a start would meet on this host.
-int check(const ServerReading& server, const std::string& path) {
-  const StartCheck found = check_start(server, path);
+/// Prints what a start would meet on this host. Cells that would go dark are named whatever else is wrong.
+int check(const ServerReading& server, const std::string& path, StoreToCheck store) {
+  const StartCheck found = check_start(server, path, store);
   for (const std::string& note : found.notes) fmt::print("{}\n", shown(note));
-  if (!found.problems.empty()) return refuse_start(found.problems);
   LineOutput said(STDERR_FILENO);
   for (const std::string& dark : found.dark) said.write(fmt::format("trammeld: {}\n", shown(dark)));
+  if (!found.problems.empty()) return refuse_start(found.problems);
   if (!found.dark.empty()) return kExitDark;
   const std::size_t cells = server.config.cells.size();
   fmt::print("{}: good, {} cell{}\n", path, cells, cells == 1 ? "" : "s");
@@ -294,7 +294,7 @@ Status serve(ServerConfig config, const Arguments& arguments) {
                    [&service] { return service.figures(); }, [&service] { return service.movement(); }});
   if (const Status listens = http.start(); !listens) return listens;
   service.set_call_listener(log_call);
-  service.set_packet_listener([](const std::string& dropped) { tell(LogLevel::kWarn, "packets_dropped", dropped); });
+  service.set_packet_listener([](const char* event, const std::string& what) { tell(LogLevel::kWarn, event, what); });
   service.set_replica_listener(log_replicas);
   trainer.set_listeners(
       [&service, &http](const JobProgress& progress) {
@@ -348,7 +348,8 @@ int run(const Arguments& arguments) {
   ServerConfig& config = server.config;
   config.trainer.compute.program = {"/proc/self/exe", kComputeWord};  // this very file, also where it was replaced
   put_over(config, arguments);
-  if (arguments.check) return check(server, arguments.config);
+  if (arguments.check)
+    return check(server, arguments.config, arguments.store ? StoreToCheck::kCopy : StoreToCheck::kOwn);
   if (!server.problems.empty()) return refuse_start(server.problems);
   if (auto log = start_log(config.log); !log) return refuse(log.error());
   const Status served = serve(config, arguments);

@@ -13,6 +13,7 @@
 #include "clients/session/parts.h"
 #include "clients/session/server_watch.h"
 #include "idl/limits.h"
+#include "idl/places.h"
 #include "idl/quiet_library.h"
 #include "server/base/mutex.h"
 
@@ -26,6 +27,7 @@ constexpr std::uint32_t kHighestDomain = 232;  // of ports that are numbers of U
 constexpr std::chrono::milliseconds kJobPoll{2000};
 constexpr std::size_t kHomesRemembered = 1000;  // of a session's jobs
 constexpr std::chrono::milliseconds kLook{50};  // between two looks at what servers say
+constexpr int kShareOfLooking = 2;              // of the timeout: its half at most, for discovery servers
 constexpr int kReferrals = 4;                   // from server to server, of one request
 constexpr std::uint32_t kLeastPatience = 10;    // ms, before a busy server is asked again
 
@@ -74,8 +76,23 @@ struct Endpoints {
   std::unique_ptr<Caller<Operation>> caller TRAMMEL_GUARDED_BY(mutex);
 };
 
+/// Adds the servers that the discovery servers tell of. It does without any where others are named.
+Status add_found_places(SessionOptions& options) {
+  const auto places =
+      wire::look_for_places(options.discovery_servers, options.domain, options.timeout / kShareOfLooking);
+  if (!places) return options.servers.empty() ? Status(tl::make_unexpected(places.error())) : Status();
+  for (const HostPort& place : *places) {
+    if (std::find(options.servers.begin(), options.servers.end(), place) == options.servers.end())
+      options.servers.push_back(place);
+  }
+  return {};
+}
+
 /// The same options with every server as a place, and the address of this host that leads there.
 Result<SessionOptions> completed(SessionOptions options) {
+  if (!options.discovery_servers.empty()) {
+    if (const Status found = add_found_places(options); !found) return tl::make_unexpected(found.error());
+  }
   if (options.servers.empty()) {
     for (const std::uint16_t port : options.server_ports) options.servers.push_back({options.address, port});
     return options;
@@ -479,7 +496,10 @@ namespace {
 std::vector<BatchOfService> batches_in(const std::vector<wire::ReadModelsReply>& replies) {
   std::vector<BatchOfService> batches;
   for (const wire::ReadModelsReply& reply : replies) {
-    for (const wire::BatchInfo& batch : reply.batches()) batches.push_back(from_wire(batch));
+    for (const wire::BatchInfo& batch : reply.batches()) {
+      batches.push_back(from_wire(batch));
+      batches.back().server = reply.header().server().to_string();
+    }
   }
   return batches;
 }

@@ -23,6 +23,8 @@ struct SessionOptions {
   /// Servers anywhere. Where there are some, `server_ports` and `address` are not looked at, and the interface is the
   /// one that leads to the first of them.
   std::vector<HostPort> servers = {};
+  /// They tell of more servers; position = number. open() asks them, for at most half the timeout.
+  std::vector<HostPort> discovery_servers = {};
   /// Folder with the certificate, key and permissions that DDS-Security asks for (deploy/security/README.md); empty:
   /// without. What the permissions do not allow is kRefused.
   std::string security = {};
@@ -38,7 +40,8 @@ struct SessionOptions {
 /// which recognises the repeat, also after a restart. A server of another contract is kRefused (contract_version).
 class Session {
  public:
-  /// Does not wait for a server. One session per process is enough.
+  /// Does not wait for a server, but for the first that a discovery server tells of; kUnreachable: there is none, and
+  /// none was named. One session per process is enough.
   [[nodiscard]] static Result<std::unique_ptr<Session>> open(const SessionOptions& options);
   ~Session();
 

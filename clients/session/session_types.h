@@ -137,8 +137,9 @@ struct BatchOfService {
   std::string reason;  ///< why it is kept out; empty: it is not
   int poses = 0;
   std::int64_t accepted_unix_s = 0;
-  std::string hash;      ///< SHA-256 of its text
-  bool learned = false;  ///< a model was made of it
+  std::string hash;         ///< SHA-256 of its text
+  bool learned = false;     ///< a model was made of it
+  std::string server = {};  ///< that says so
 };
 
 /// What a replica serves a cell with.

@@ -22,16 +22,28 @@ constexpr std::array<const char*, kDroppedReasons> kNames = {"no RTPS message", 
 
 const char* name_of(Dropped reason) { return kNames[static_cast<std::size_t>(reason)]; }
 
-Guard::Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts)
-    : largest_sample_(largest_sample), counts_(counts ? std::move(counts) : std::make_shared<DropCounts>()) {}
+Guard::Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts, std::vector<Relay> relays)
+    : largest_sample_(largest_sample),
+      counts_(counts ? std::move(counts) : std::make_shared<DropCounts>()),
+      relays_(std::move(relays)) {}
 
 std::optional<Bytes> Guard::check(Bytes message, std::uint64_t socket, Time now) {
   EditedMessage edited(message);
-  if (const auto dropped = MessageCheck({largest_sample_, socket, now}, memory_, message, edited).run()) {
+  const bool relayed = is_of_relay(message, socket);
+  if (const auto dropped = MessageCheck({largest_sample_, socket, now, relayed}, memory_, message, edited).run()) {
     counts_->add(*dropped);
     return std::nullopt;
   }
   return edited.bytes();
+}
+
+bool Guard::is_of_relay(Bytes message, std::uint64_t socket) const {
+  if (message.size() < kHeader) return false;
+  const Bytes prefix = message.subspan(kPrefixAt, kPrefix);
+  return std::any_of(relays_.begin(), relays_.end(), [&](const Relay& relay) {
+    return relay.address == static_cast<std::uint32_t>(socket) &&
+           std::equal(prefix.begin(), prefix.end(), relay.prefix.begin());
+  });
 }
 
 void Guard::sent(Bytes message) {

@@ -4,9 +4,11 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "idl/guard/dropped.h"
 #include "idl/guard/guard_memory.h"
+#include "idl/guard/relay.h"
 #include "idl/guard/rtps_bytes.h"
 
 namespace trammel::wire {
@@ -20,7 +22,9 @@ class Guard {
   using Time = std::chrono::steady_clock::time_point;
 
   /// `largest_sample`: bytes that a sample of any topic may have.
-  explicit Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts = nullptr);
+  /// `relays` may announce others.
+  explicit Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts = nullptr,
+                 std::vector<Relay> relays = {});
 
   /// What of a message that was received from `socket` (address and port) the library may see: all of it, as a rule.
   /// Empty: nothing. Valid until the calling thread's next call.
@@ -32,10 +36,12 @@ class Guard {
   [[nodiscard]] const DropCounts& counts() const { return *counts_; }
 
  private:
+  [[nodiscard]] bool is_of_relay(Bytes message, std::uint64_t socket) const;
   void confirm(Bytes to, const Submessage& acknack);
 
   const std::uint32_t largest_sample_;
   const std::shared_ptr<DropCounts> counts_;
+  const std::vector<Relay> relays_;
   GuardMemory memory_;
 };
 

@@ -73,6 +73,7 @@ std::optional<Fragments> fragments_of(const Submessage& submessage) {
 std::optional<Dropped> MessageCheck::run() {
   if (const Fault fault = check_header()) return fault;
   source_ = message_.subspan(kPrefixAt, kPrefix);
+  named_ = received_.relayed ? Bytes() : source_;
   Bytes rest = message_.subspan(kHeader);
   while (!rest.empty()) {
     const auto submessage = next_submessage(rest);
@@ -98,7 +99,7 @@ std::optional<Dropped> MessageCheck::check_submessage(const Submessage& submessa
   };
   switch (submessage.id) {
     case kData:
-      return check_data(submessage);
+      return received_.relayed ? check_relayed_data(submessage) : check_data(submessage);
     case kDataFrag:
       return check_fragments(submessage);
     case kHeartbeat:
@@ -143,11 +144,11 @@ std::optional<Dropped> MessageCheck::check_data(const Submessage& submessage) {
   const bool announcement = is_announcement_writer(head->writer);
   bool says_status = false;
   if ((submessage.flags & kInlineQos) != 0) {
-    if (const Fault fault = check_inline_qos(after, source_, announcement, says_status)) return fault;
+    if (const Fault fault = check_inline_qos(after, named_, announcement, says_status)) return fault;
   }
   const bool payload = (submessage.flags & kPayload) != 0, key = (submessage.flags & kKey) != 0;
   if (payload && key) return Dropped::kLength;
-  if (!payload && head->writer == kAnnouncer) {
+  if (!payload && head->writer == kAnnouncer && !received_.relayed) {
     const MutexLock lock(memory_.mutex);
     memory_.participants.left(source_);
   }
@@ -158,13 +159,37 @@ std::optional<Dropped> MessageCheck::check_data(const Submessage& submessage) {
   return handshake ? check_handshake(after.rest(), source_) : check_announced(head->writer, after.rest());
 }
 
+/// The writer is reliable: what never arrives is asked for again for ever, and all behind it waits. So what may not
+/// pass is said not to exist.
+std::optional<Dropped> MessageCheck::check_relayed_data(const Submessage& submessage) {
+  const Fault fault = check_data(submessage);
+  if (!fault) return {};
+  constexpr std::size_t kGapBody = 28;
+  Reader reader(submessage.body, submessage.little_endian());
+  if (!reader.take(4) || !take_head(reader) || submessage.body.size() < kGapBody) return fault;
+  const auto number = reader.sequence_number();
+  if (!is_number(number)) return fault;
+  make_gap(submessage, *number);
+  return {};
+}
+
+/// In place: it skips this one number.
+void MessageCheck::make_gap(const Submessage& data, std::int64_t number) {
+  const bool little_endian = data.little_endian();
+  const std::array<unsigned char, 2> head = {kGap, static_cast<unsigned char>(data.flags & kLittleEndian)};
+  edited_.put(message_.subspan(static_cast<std::size_t>(data.body.data() - message_.data()) - 4, 2), head);
+  edited_.put(data.body.first(16), data.body.subspan(4, 16));  // reader, writer, the first number that is skipped
+  edited_.put_sequence_number(data.body.subspan(16, 8), number + 1, little_endian);
+  edited_.put(data.body.subspan(24, 4), std::uint32_t{0}, little_endian);
+}
+
 std::optional<Dropped> MessageCheck::check_announced(std::uint32_t writer, Bytes payload) {
   std::uint32_t lease_seconds = 0;
   if (is_announcement_writer(writer)) {
-    if (const Fault fault = check_announcement(payload, source_, edited_, lease_seconds)) return fault;
+    if (const Fault fault = check_announcement(payload, named_, edited_, lease_seconds)) return fault;
   }
   if (is_liveliness_writer(writer) && payload.size() < 24) return Dropped::kLength;
-  if (writer != kAnnouncer) return {};
+  if (writer != kAnnouncer || received_.relayed) return {};
   const MutexLock lock(memory_.mutex);
   return memory_.participants.announced(source_, received_.socket, std::chrono::seconds(lease_seconds), received_.now);
 }

@@ -19,6 +19,7 @@ class MessageCheck {
     std::uint32_t largest_sample = 0;  // bytes
     std::uint64_t socket = 0;
     SequenceWatch::Time now{};
+    bool relayed = false;  // a Relay sent it
   };
   MessageCheck(Circumstances received, GuardMemory& memory, Bytes message, EditedMessage& edited)
       : received_(received), memory_(memory), message_(message), edited_(edited) {}
@@ -31,6 +32,8 @@ class MessageCheck {
   Fault check_header();
   Fault check_submessage(const Submessage& submessage, Bytes behind);
   Fault check_data(const Submessage& submessage);
+  Fault check_relayed_data(const Submessage& submessage);
+  void make_gap(const Submessage& data, std::int64_t number);
   Fault check_announced(std::uint32_t writer, Bytes payload);
   Fault check_fragments(const Submessage& submessage);
   Fault check_heartbeat(const Submessage& submessage);
@@ -47,6 +50,7 @@ class MessageCheck {
   const Bytes message_;
   EditedMessage& edited_;
   Bytes source_{};  // prefix
+  Bytes named_{};   // the prefix that announcements must name; empty: any
 };
 
 }  // namespace trammel::wire

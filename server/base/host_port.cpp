@@ -67,6 +67,21 @@ Result<HostPort> parse_host_port(const std::string& text, std::uint16_t port) {
   return HostPort{*address, *said};
 }
 
+Result<std::vector<HostPort>> parse_hosts(const std::vector<std::string>& hosts,
+                                          const std::vector<std::uint16_t>& ports) {
+  std::vector<HostPort> places;
+  for (const std::string& host : hosts) {
+    const bool has_port = host.find(':') != std::string::npos;
+    const std::size_t count = has_port ? 1 : ports.size();
+    for (std::size_t i = 0; i < count; ++i) {
+      auto place = parse_host_port(host, has_port ? 0 : ports[i]);
+      if (!place) return tl::make_unexpected(std::move(place.error()));
+      places.push_back(*std::move(place));
+    }
+  }
+  return places;
+}
+
 std::string to_string(const HostPort& place) { return fmt::format("{}:{}", place.address, place.port); }
 
 std::vector<std::string> own_addresses() {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -15,9 +16,16 @@ struct HostPort {
   bool operator==(const HostPort&) const = default;
 };
 
+inline constexpr std::uint16_t kDiscoveryPort = 11811;  ///< of a discovery server, where none is said
+inline constexpr std::size_t kMostDiscoveryServers = 8;
+
 /// From `host` or `host:port`, the host a name or an IPv4 address: a name becomes its first address. `port`: where none
 /// is said. kUsage: it is neither, or nobody knows the name.
 [[nodiscard]] Result<HostPort> parse_host_port(const std::string& text, std::uint16_t port);
+
+/// The same of several; one without a port is at each of `ports`.
+[[nodiscard]] Result<std::vector<HostPort>> parse_hosts(const std::vector<std::string>& hosts,
+                                                        const std::vector<std::uint16_t>& ports);
 
 [[nodiscard]] std::string to_string(const HostPort& place);
 

@@ -71,6 +71,7 @@ ReloadPlan plan_reload(const ServerConfig& present, const ServerConfig& file) {
   leave("models_in_memory_mb", present.models_in_memory, file.models_in_memory, &plan.later);
   leave("dds: peer_ports", present.dds.peer_ports, file.dds.peer_ports, &plan.later);
   leave("dds: peers", present.dds.peers, file.dds.peers, &plan.later);
+  leave("dds: discovery_servers", present.dds.discovery_servers, file.dds.discovery_servers, &plan.later);
   leave("dds: ros2", present.dds.ros2, file.dds.ros2, &plan.later);
   leave("dds: security", present.dds.security, file.dds.security, &plan.later);
   leave("dds: compute_workers", present.dds.compute_workers, file.dds.compute_workers, &plan.later);

@@ -45,20 +45,33 @@ std::string server_id(const YamlMap& map, const std::string& key) {
   return id;
 }
 
+/// What the file agrees to. A word that cannot be read is refused by itself; the address is not blamed for it.
+struct Consent {
+  bool network = true;
+  bool without_security = true;
+};
+
+Consent consent(const YamlMap& map) {
+  Consent given;
+  map.attempt([&] { given.network = map.boolean("allow_network", false); });
+  map.attempt([&] { given.without_security = map.boolean("without_security", false); });
+  return given;
+}
+
 /// Reads an IPv4 address. Refuses others than loopback unless the network is allowed, and unless it is said who may do
 /// what there, or that everybody may do everything.
-std::string address(const YamlMap& map, const std::string& otherwise) {
+std::string address(const YamlMap& map, const std::string& otherwise, const Consent& given) {
   const std::string text = map.text("address", otherwise);
   in_addr parsed{};
   if (::inet_pton(AF_INET, text.c_str(), &parsed) != 1) {
     map.refuse("address", refused("'{}' is no IPv4 address", text).with_text(text));
   }
   const bool loopback = (ntohl(parsed.s_addr) >> 24) == 127;
-  if (!loopback && !map.boolean("allow_network", false)) {
+  if (!loopback && !given.network) {
     map.refuse("address",
                refused("{} leaves this host", text).with_text(text).next("say allow_network: true if that is meant"));
   }
-  if (!loopback && map.is_null("security") && !map.boolean("without_security", false)) {
+  if (!loopback && map.is_null("security") && !given.without_security) {
     map.refuse("address", refused("whoever reaches {} could change models", text)
                               .with_text(text)
                               .next("name certificates (security: FOLDER, see deploy/security/README.md), or say "
@@ -95,17 +108,41 @@ std::vector<HostPort> peers(const YamlMap& map) {
   return places;
 }
 
+/// The position of each is its number, so that none is said twice.
+std::vector<HostPort> discovery_servers(const YamlMap& map, const DdsOptions& dds) {
+  const std::string key = "discovery_servers";
+  std::vector<HostPort> places;
+  if (!map.has(key)) return places;
+  for (const std::string& text : map.texts(key)) {
+    const auto place = parse_host_port(text, kDiscoveryPort);
+    if (!place) map.refuse(key, refused("{}", place.error().message).with_text(text));
+    if (std::find(places.begin(), places.end(), *place) != places.end())
+      map.refuse(key, refused("{} is given twice", text).with_text(text));
+    if (dds.address.starts_with("127.") && !place->address.starts_with("127."))
+      map.refuse(key, refused("{} is not on this host, and nobody there can come to {}", text, dds.address)
+                          .with_text(text)
+                          .next("say the address that clients come to (address, allow_network)"));
+    places.push_back(*place);
+  }
+  if (places.size() > kMostDiscoveryServers)
+    map.refuse(key, refused("{} discovery servers, limit {}", places.size(), kMostDiscoveryServers)
+                        .beyond(static_cast<double>(places.size()), static_cast<double>(kMostDiscoveryServers)));
+  return places;
+}
+
 void read_dds(const YamlMap& map, const std::filesystem::path& folder, DdsOptions& dds) {
   map.only({"domain", "address", "allow_network", "without_security", "security", "port", "peer_ports", "peers",
-            "compute_workers", "max_clients", "client_requests", "client_mb", "queued_requests", "queued_mb",
-            "cell_share", "ros2"});
+            "discovery_servers", "compute_workers", "max_clients", "client_requests", "client_mb", "queued_requests",
+            "queued_mb", "cell_share", "ros2"});
   map.attempt([&] {
     dds.domain = static_cast<std::uint32_t>(integer_within(map, "domain", static_cast<int>(dds.domain), 0, kMaxDomain));
   });
-  map.attempt([&] { dds.address = address(map, dds.address); });
+  const Consent given = consent(map);
+  map.attempt([&] { dds.address = address(map, dds.address, given); });
   map.attempt([&] { dds.port = static_cast<std::uint16_t>(integer_within(map, "port", dds.port, 1024, 65535)); });
   map.attempt([&] { dds.peer_ports = peer_ports(map, dds.port); });
   map.attempt([&] { dds.peers = peers(map); });
+  map.attempt([&] { dds.discovery_servers = discovery_servers(map, dds); });
   map.attempt([&] {
     if (!map.is_null("security")) dds.security = (folder / map.text("security")).string();
   });

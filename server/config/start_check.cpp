@@ -53,32 +53,51 @@ void look_at_cells(const ServerConfig& config, StartCheck& check) {
   }
 }
 
+bool is_held(const Status& status) { return !status && status.error().code == ErrorCode::kConflict; }
+
+/// Notes what is wrong with the values of one server file.
+class Verdict {
+ public:
+  Verdict(const std::string& path, StoreToCheck store, StartCheck& check) : path_(path), store_(store), check_(check) {}
+
+  void add(const char* key, const Status& status) {
+    if (!status) check_.problems.push_back(at_key(key, path_, status.error()));
+  }
+  /// What another process holds is no problem beside a copy of the store.
+  void add_holdable(const char* key, const Status& status) {
+    if (store_ == StoreToCheck::kOwn || !is_held(status)) return add(key, status);
+    check_.notes.push_back(
+        fmt::format("{} is in use, which does not matter to this check: {}", key, sentence(status.error())));
+  }
+
+ private:
+  const std::string& path_;
+  StoreToCheck store_;
+  StartCheck& check_;
+};
+
 }  // namespace
 
-StartCheck check_start(const ServerReading& server, const std::string& path) {
+StartCheck check_start(const ServerReading& server, const std::string& path, StoreToCheck whose) {
   const ServerConfig& config = server.config;
   StartCheck check{server.problems, {}, {}};
-  const auto wrong = [&](const char* key, const Error& error) { check.problems.push_back(at_key(key, path, error)); };
+  Verdict verdict(path, whose, check);
   const Status store = config.store.empty() ? Status() : check_store(config.store);
   Status port;
   if (was_read(server, "dds")) port = PortLock::take(config.dds.address, config.dds.port).map([](const PortLock&) {});
-  const bool store_held = !store && store.error().code == ErrorCode::kConflict;
-  if (store_held && !port && port.error().code == ErrorCode::kConflict) {
+  if (is_held(store) && is_held(port)) {
     check.notes.push_back(fmt::format("{}: runs already, it seems: {}", path, sentence(store.error())));
   } else {
-    if (!store) wrong("store", store.error());
-    if (!port) wrong(port.error().code == ErrorCode::kConflict ? "dds: port" : "dds: address", port.error());
+    verdict.add_holdable("store", store);
+    verdict.add_holdable(is_held(port) ? "dds: port" : "dds: address", port);
     const Status http = was_read(server, "http") ? check_http_options(config.http) : Status();
-    if (!http) wrong(http.error().code == ErrorCode::kConflict ? "http: port" : "http: address", http.error());
+    verdict.add_holdable(is_held(http) ? "http: port" : "http: address", http);
   }
-  const Status security = was_read(server, "dds") ? check_security(config.dds.security) : Status();
-  if (!security) wrong("dds: security", security.error());
-  if (!config.log.file.empty()) {
-    if (const Status log = check_writable(config.log.file); !log) wrong("log: file", log.error());
-  }
-  if (const Status folder = check_records(config.dds.record); !folder) wrong("record: folder", folder.error());
+  if (was_read(server, "dds")) verdict.add("dds: security", check_security(config.dds.security));
+  if (!config.log.file.empty()) verdict.add("log: file", check_writable(config.log.file));
+  verdict.add("record: folder", check_records(config.dds.record));
   std::error_code error;
-  const bool is_there = store || store_held;
+  const bool is_there = store || is_held(store);
   if (is_there && std::filesystem::exists(config.store, error)) look_at_cells(config, check);
   return check;
 }

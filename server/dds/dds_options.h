@@ -26,12 +26,13 @@ struct ReplicaOptions {
 /// Domain, address, ports and name of the service on DDS. The default talks to this host only.
 struct DdsOptions {
   std::uint32_t domain = 0;
-  std::string address = "127.0.0.1";      ///< IPv4 of the only interface that is used
-  std::uint16_t port = 17500;             ///< UDP; clients look for the server here; one server per port
-  std::vector<std::uint16_t> peer_ports;  ///< UDP ports of the replicas on `address`
-  std::vector<HostPort> peers;            ///< where else it looks for replicas: on other hosts, too
-  std::string security;                   ///< folder of idl/security.h; empty: everybody is believed
-  std::string server_id = "trammel";      ///< unique among replicas; 1 to 64 letters, digits, `.`, `_`, `-`
+  std::string address = "127.0.0.1";        ///< IPv4 of the only interface that is used
+  std::uint16_t port = 17500;               ///< UDP; clients look for the server here; one server per port
+  std::vector<std::uint16_t> peer_ports;    ///< UDP ports of the replicas on `address`
+  std::vector<HostPort> peers;              ///< where else it looks for replicas: on other hosts, too
+  std::vector<HostPort> discovery_servers;  ///< they tell clients of `address` and `port`; position = number
+  std::string security;                     ///< folder of idl/security.h; empty: everybody is believed
+  std::string server_id = "trammel";        ///< unique among replicas; 1 to 64 letters, digits, `.`, `_`, `-`
   std::string program_version = "0.1.0";
   int compute_workers = 2;     ///< threads for PredictError, and as many for CorrectTarget
   int max_clients = 256;       ///< reply channels at a time; when more clients come, those take turns that do nothing

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "idl/places.h"
 #include "idl/ros2.h"
 #include "idl/transport.h"
 #include "server/base/mutex.h"
@@ -113,15 +114,16 @@ class ThreadName {
 
 Result<std::optional<wire::Security>> security_of(const std::string& folder) {
   if (folder.empty()) return std::nullopt;
-  return wire::read_security(folder).map([](wire::Security security) { return std::optional(std::move(security)); });
+  auto security = wire::read_security(folder);
+  if (!security) return tl::make_unexpected(security.error());
+  if (const Status serves = wire::check_serves(*security); !serves) return tl::make_unexpected(serves.error());
+  return std::optional(std::move(*security));
 }
 
 }  // namespace
 
 class DdsService::Running {
  public:
-  using PacketListener = std::function<void(const std::string& dropped)>;
-
   [[nodiscard]] static Result<std::unique_ptr<Running>> start(const DdsOptions& options, Trainer& trainer, Store& store,
                                                               const ModelRegistry& registry,
                                                               const PacketListener& packet_listener,
@@ -171,15 +173,19 @@ class DdsService::Running {
     running->packet_listener_ = packet_listener;
     running->status_thread_ = std::jthread([r = running.get()](const std::stop_token& stop) { r->tell_status(stop); });
     running->watchdog_ = std::make_unique<Watchdog>(running->moving_parts(heard));
+    if (const Status told = running->tell_place(); !told) return tl::make_unexpected(told.error());
     return running;
   }
 
   ~Running() {
+    beacon_.reset();
     watchdog_.reset();
     status_thread_ = {};
+    tell_refused(Clock::now() + PacketReport::kAtMostEvery);  // also what would have been told later
     publish_status(wire::SERVICE_STOPPING);
     for (const auto& endpoint : endpoints_) endpoint->close();
     old_contract_.reset();
+    if (replicas_) replicas_->stop_copying();
     for (Lane* lane : lanes()) lane->stop();
     replies_thread_ = {};
     endpoints_.clear();
@@ -237,7 +243,7 @@ class DdsService::Running {
     now.work = handlers_.work().all();
     if (replicas_) now.replica = replicas_->figures();
     if (recorder_) now.not_recorded = recorder_->dropped();
-    now.strangers = events_->strangers().count;
+    now.strangers = events_->refusals();
     for (std::size_t i = 0; i < wire::kDroppedReasons; ++i) {
       const auto reason = static_cast<wire::Dropped>(i);
       now.dropped_packets[wire::name_of(reason)] = dropped_->of(reason);
@@ -269,6 +275,16 @@ class DdsService::Running {
         reads_(limits_of_reads(options), room_, kBehindComputing),
         changes_(limits_of_changes(options), room_, kBehindComputing),
         core_{options.server_id, *participant_, subscriber, trainer, handlers_, channels_} {}
+
+  /// Last: who hears of the place may ask at once.
+  Status tell_place() {
+    if (options_.discovery_servers.empty()) return {};
+    const wire::Place place{{options_.address, options_.port}, options_.domain, options_.server_id};
+    auto beacon = wire::announce_place(place, options_.discovery_servers);
+    if (!beacon) return tl::make_unexpected(beacon.error());
+    beacon_ = std::move(*beacon);
+    return {};
+  }
 
   Status open_endpoints() {
     const auto open = [this]<typename Operation>(Operation, Lanes lanes) -> Status {
@@ -321,14 +337,20 @@ class DdsService::Running {
         told = Clock::now();
       }
       ++status_steps_;
-      if (const auto dropped = packets_->due(Clock::now())) packet_listener_(*dropped);
-      if (const auto refused = strangers_.due(events_->strangers(), Clock::now())) packet_listener_(*refused);
+      tell_refused(Clock::now());
       const bool clients_wait = channels_.tend();
       ++status_steps_;
       const auto left = std::chrono::ceil<std::chrono::milliseconds>(told + wire::kStatusPeriod - Clock::now());
       news = events_->wait(stop, clients_wait ? std::min(left, wire::kAnnouncement) : left);
       channels_.heard(news.readers);
     }
+  }
+
+  /// What did not reach the service, as far as it is due by then.
+  void tell_refused(Clock::time_point now) {
+    if (!packets_) return;  // the start has failed
+    if (const auto dropped = packets_->due(now)) packet_listener_("packets_dropped", *dropped);
+    for (const std::string& refused : events_->strangers_due(now)) packet_listener_("participant_refused", refused);
   }
 
   /// The threads of this service and of the library that the watchdog watches. Each counts its own work.
@@ -399,11 +421,11 @@ class DdsService::Running {
   std::atomic<std::uint64_t> status_steps_{0};
   std::shared_ptr<const wire::DropCounts> dropped_;
   std::optional<PacketReport> packets_;  // of the status thread
-  StrangerReport strangers_;             // likewise
   PacketListener packet_listener_;
   std::jthread replies_thread_;
   std::jthread status_thread_;
   std::unique_ptr<Watchdog> watchdog_;
+  wire::ParticipantPtr beacon_;  // what discovery servers tell of it; null: none
 };
 
 Status check_security(const std::string& folder) {
@@ -421,9 +443,7 @@ void DdsService::set_call_listener(CallListener listener) { call_listener_ = std
 
 void DdsService::set_replica_listener(ReplicaListener listener) { replica_listener_ = std::move(listener); }
 
-void DdsService::set_packet_listener(std::function<void(const std::string& dropped)> listener) {
-  packet_listener_ = std::move(listener);
-}
+void DdsService::set_packet_listener(PacketListener listener) { packet_listener_ = std::move(listener); }
 
 Status DdsService::start() {
   {

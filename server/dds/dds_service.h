@@ -21,6 +21,9 @@ namespace trammel {
 /// Whether requests can be recorded there; makes nothing.
 [[nodiscard]] Status check_records(const RecordOptions& options);
 
+/// Told of what did not reach the service: `packets_dropped` or `participant_refused`, and a sentence.
+using PacketListener = std::function<void(const char* event, const std::string& what)>;
+
 /// The service on DDS: answers the requests of idl/ and publishes the state topics. Owns the threads that work on
 /// requests (schedule/lane.h: DdsOptions::compute_workers for each of PredictError and CorrectTarget, some for what
 /// reads and some for what changes), one that sends replies which had to wait, and one that publishes its status every
@@ -32,9 +35,10 @@ class DdsService {
   DdsService(DdsOptions options, Trainer& trainer, Store& store, const ModelRegistry& registry);
   ~DdsService();  ///< stops as stop()
 
-  /// Called with a sentence for the log when packets have been dropped (idl/guard) or participants refused, each at
-  /// most once a minute, in a thread of the service. Set it before start().
-  void set_packet_listener(std::function<void(const std::string& dropped)> listener);
+  /// Called with an event and a sentence for the log when packets have been dropped (idl/guard) or participants
+  /// refused, each at most once a minute and what is left at stop(), in a thread of the service or in that of stop().
+  /// Set it before start().
+  void set_packet_listener(PacketListener listener);
   /// Called when a request was to change something, or was refused, in the thread that answers it. Set it before
   /// start().
   void set_call_listener(CallListener listener);
@@ -71,7 +75,7 @@ class DdsService {
   void while_running(const Work& work);
 
   const DdsOptions options_;
-  std::function<void(const std::string&)> packet_listener_ = [](const std::string&) {};
+  PacketListener packet_listener_ = [](const char*, const std::string&) {};
   CallListener call_listener_;
   ReplicaListener replica_listener_;
   Trainer& trainer_;

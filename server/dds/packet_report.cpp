@@ -19,13 +19,26 @@ std::optional<std::string> PacketReport::due(Time now) {
   return "packets were dropped unread: " + reasons;
 }
 
-std::optional<std::string> StrangerReport::due(const Strangers& strangers, PacketReport::Time now) {
-  if (strangers.count == told_ || (told_at_ && now - *told_at_ < PacketReport::kAtMostEvery)) return std::nullopt;
-  const std::uint64_t more = strangers.count - told_;
-  told_ = strangers.count;
+void StrangerReport::refused(const std::string& who, const std::string& guid) {
+  ++tries_;
+  const bool is_told = strangers_.contains(who) || strangers_.size() < kTold;
+  Stranger& stranger = strangers_[is_told ? who : "others"];
+  ++stranger.tries;
+  stranger.guid = guid;
+}
+
+std::vector<std::string> StrangerReport::due(PacketReport::Time now) {
+  if (strangers_.empty() || (told_at_ && now - *told_at_ < PacketReport::kAtMostEvery)) return {};
+  std::vector<std::string> lines;
+  for (const auto& [who, stranger] : strangers_) {
+    lines.push_back(
+        fmt::format("a participant without the right certificate or permissions was refused: {} ({} {}, "
+                    "the last of {})",
+                    who, stranger.tries, stranger.tries == 1 ? "try" : "tries", stranger.guid));
+  }
+  strangers_.clear();
   told_at_ = now;
-  return fmt::format("participants without the right certificate or permissions were refused: {} tries, the last of {}",
-                     more, strangers.last);
+  return lines;
 }
 
 }  // namespace trammel

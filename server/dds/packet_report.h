@@ -3,12 +3,13 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "idl/guard/dropped.h"
-#include "server/dds/service_events.h"
 
 namespace trammel {
 
@@ -29,14 +30,26 @@ class PacketReport {
   std::optional<Time> told_at_;
 };
 
-/// Says how many participants were refused, at most once a minute. Not thread-safe.
+/// Counts the participants that DDS-Security refused (no certificate, one of another authority, one that was revoked)
+/// and says who they were, at most once a minute. Not thread-safe.
 class StrangerReport {
  public:
-  /// What is new since the last report; empty when nothing is, or when the last report is too young.
-  [[nodiscard]] std::optional<std::string> due(const Strangers& strangers, PacketReport::Time now);
+  /// More than these in a minute are told as one.
+  static constexpr std::size_t kTold = 16;
+
+  /// `who`: what it says of itself. A participant tries again and again, under one GUID.
+  void refused(const std::string& who, const std::string& guid);
+  /// One sentence for each who was refused since the last report; empty where the last report is too young.
+  [[nodiscard]] std::vector<std::string> due(PacketReport::Time now);
+  [[nodiscard]] std::uint64_t tries() const { return tries_; }
 
  private:
-  std::uint64_t told_ = 0;
+  struct Stranger {
+    std::uint64_t tries = 0;
+    std::string guid = {};
+  };
+  std::uint64_t tries_ = 0;
+  std::map<std::string, Stranger> strangers_;  // since the last report, by what they say of themselves
   std::optional<PacketReport::Time> told_at_;
 };
 

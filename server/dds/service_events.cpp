@@ -1,5 +1,7 @@
 #include "server/dds/service_events.h"
 
+#include <fastrtps/utils/IPLocator.h>
+
 #include <sstream>
 #include <utility>
 
@@ -13,6 +15,16 @@ constexpr std::size_t kMaxReaders = 4096;
 std::string claimed_subject(const eprosima::fastrtps::rtps::IdentityToken& token) {
   for (const auto& property : token.properties()) {
     if (property.name() == "dds.cert.sn") return property.value();
+  }
+  return {};
+}
+
+/// Where the participant says that it can be reached; empty: it does not say.
+std::string claimed_address(const eprosima::fastrtps::rtps::ParticipantProxyData& participant) {
+  for (const auto* locators : {&participant.metatraffic_locators.unicast, &participant.default_locators.unicast}) {
+    for (const auto& locator : *locators) {
+      if (locator.kind == LOCATOR_KIND_UDPv4) return eprosima::fastrtps::rtps::IPLocator::toIPv4string(locator);
+    }
   }
   return {};
 }
@@ -70,7 +82,7 @@ void ServiceEvents::on_participant_discovery(wire::dds::DomainParticipant*,
   using Info = eprosima::fastrtps::rtps::ParticipantDiscoveryInfo;
   const std::string participant = wire::participant_of(info.info.m_guid);
   if (info.status != Info::REMOVED_PARTICIPANT && info.status != Info::DROPPED_PARTICIPANT) {
-    names_.announced(participant, claimed_subject(info.info.identity_token_));
+    names_.announced(participant, claimed_subject(info.info.identity_token_), claimed_address(info.info));
     return;
   }
   names_.left(participant);
@@ -81,9 +93,14 @@ void ServiceEvents::on_participant_discovery(wire::dds::DomainParticipant*,
   changed_.notify_one();
 }
 
-Strangers ServiceEvents::strangers() const {
+std::uint64_t ServiceEvents::refusals() const {
   const MutexLock lock(mutex_);
-  return strangers_;
+  return strangers_.tries();
+}
+
+std::vector<std::string> ServiceEvents::strangers_due(PacketReport::Time now) {
+  const MutexLock lock(mutex_);
+  return strangers_.due(now);
 }
 
 void ServiceEvents::onParticipantAuthentication(wire::dds::DomainParticipant*,
@@ -94,12 +111,11 @@ void ServiceEvents::onParticipantAuthentication(wire::dds::DomainParticipant*,
     names_.let_in(participant);
     return;
   }
-  names_.refused(participant);
+  const std::string who = names_.refused(participant);
   std::ostringstream guid;
   guid << info.guid.guidPrefix;
   const MutexLock lock(mutex_);
-  ++strangers_.count;
-  strangers_.last = guid.str();
+  strangers_.refused(who, guid.str());
 }
 
 }  // namespace trammel

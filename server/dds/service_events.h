@@ -11,6 +11,7 @@
 #include "idl/transport.h"
 #include "server/base/mutex.h"
 #include "server/dds/client_names.h"
+#include "server/dds/packet_report.h"
 #include "server/dds/schedule/channel_book.h"
 
 namespace trammel {
@@ -19,12 +20,6 @@ namespace trammel {
 struct ReaderEvent {
   enum class Kind { kFound, kLost, kLeft } kind;
   ReplyReader reader;
-};
-
-/// Participants that DDS-Security refused: no certificate, one of another authority, one that was revoked.
-struct Strangers {
-  std::uint64_t count = 0;  ///< of tries: one participant tries again and again
-  std::string last;         ///< the GUID of the last one
 };
 
 /// What the status thread of a service waits for. As the participant's listener it notes the readers of replies, and
@@ -44,7 +39,10 @@ class ServiceEvents final : public wire::dds::DomainParticipantListener {
   /// Waits until something has happened, at most `limit`.
   [[nodiscard]] News wait(const std::stop_token& stop, std::chrono::milliseconds limit);
 
-  [[nodiscard]] Strangers strangers() const;
+  /// How often participants were refused: one participant tries again and again.
+  [[nodiscard]] std::uint64_t refusals() const;
+  /// What StrangerReport has to say by then.
+  [[nodiscard]] std::vector<std::string> strangers_due(PacketReport::Time now);
   [[nodiscard]] const ClientNames& names() const { return names_; }
 
  private:
@@ -62,7 +60,7 @@ class ServiceEvents final : public wire::dds::DomainParticipantListener {
   bool status_changed_ TRAMMEL_GUARDED_BY(mutex_) = false;
   std::vector<ReaderEvent> readers_ TRAMMEL_GUARDED_BY(mutex_);
   std::set<std::string> left_ TRAMMEL_GUARDED_BY(mutex_);  // participants
-  Strangers strangers_ TRAMMEL_GUARDED_BY(mutex_);
+  StrangerReport strangers_ TRAMMEL_GUARDED_BY(mutex_);
 };
 
 }  // namespace trammel

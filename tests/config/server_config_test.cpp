@@ -187,6 +187,24 @@ TEST_F(ServerConfigTest, RefusesWrongTypes) {
   EXPECT_EQ(refusal_of("version: [1\n"), at(2));
 }
 
+TEST_F(ServerConfigTest, RefusesAWordOfConsentThatIsNoneAlsoWhereTheAddressDoesNotNeedIt) {
+  for (const char* key : {"allow_network", "without_security"}) {
+    const std::string field = fmt::format("dds: {}", key);
+    EXPECT_EQ(refusal_for(fmt::format("dds: {{{}: nope}}\n", key)), at(5, field).text("nope"));
+    EXPECT_EQ(refusal_for(fmt::format("dds: {{{}: 7}}\n", key)), at(5, field).text("7"));
+    for (const char* no_word : {"[1]", "null", "{a: 1}"}) {
+      const auto read =
+          read_server(folder_.write("server.yaml", kMinimal + fmt::format("dds: {{{}: {}}}\n", key, no_word)));
+      ASSERT_EQ(read.problems.size(), 1u) << key << ": " << no_word;
+      EXPECT_EQ(read.problems[0].field, field) << no_word;
+      EXPECT_EQ(read.problems[0].row, 5) << no_word;
+    }
+  }
+  const auto both = read_server(folder_.write(
+      "server.yaml", kMinimal + "dds: {address: 192.168.1.5, allow_network: nope, without_security: nope}\n"));
+  EXPECT_EQ(both.problems.size(), 2u) << "each by itself, and not the address";
+}
+
 TEST_F(ServerConfigTest, RefusesAnAddressThatLeavesTheHostUnlessThatIsMeant) {
   EXPECT_EQ(refusal_for("dds: {address: 192.168.1.5}\n"), at(5, "dds: address").text("192.168.1.5"));
   EXPECT_EQ(refusal_for("dds: {address: 0.0.0.0}\n"), at(5, "dds: address").text("0.0.0.0"));
@@ -204,6 +222,20 @@ TEST_F(ServerConfigTest, ReplicasElsewhereAreNamedWithTheirPortOrHaveTheUsualOne
   const std::vector<HostPort> expected = {{"10.1.0.4", 17500}, {"10.1.0.5", 17502}};
   EXPECT_EQ(read("dds: {peers: [10.1.0.4, '10.1.0.5:17502']}\n").dds.peers, expected);
   EXPECT_EQ(refusal_for("dds: {peers: ['10.1.0.5:80']}\n"), at(5, "dds: peers").text("10.1.0.5:80"));
+}
+
+TEST_F(ServerConfigTest, DiscoveryServersAreFewDifferentAndWithinReach) {
+  const std::vector<HostPort> expected = {{"127.0.0.1", 11811}, {"127.0.0.1", 11812}};
+  EXPECT_EQ(read("dds: {discovery_servers: [127.0.0.1, '127.0.0.1:11812']}\n").dds.discovery_servers, expected);
+  EXPECT_EQ(refusal_for("dds: {discovery_servers: ['127.0.0.1:80']}\n"),
+            at(5, "dds: discovery_servers").text("127.0.0.1:80"));
+  EXPECT_EQ(refusal_for("dds: {discovery_servers: [127.0.0.1, '127.0.0.1:11811']}\n"),
+            at(5, "dds: discovery_servers").text("127.0.0.1:11811"));
+  EXPECT_EQ(refusal_for("dds: {discovery_servers: [10.1.0.4]}\n"), at(5, "dds: discovery_servers").text("10.1.0.4"));
+  EXPECT_EQ(refusal_for("dds: {discovery_servers: ['127.0.0.1:2001', '127.0.0.1:2002', '127.0.0.1:2003', "
+                        "'127.0.0.1:2004', '127.0.0.1:2005', '127.0.0.1:2006', '127.0.0.1:2007', '127.0.0.1:2008', "
+                        "'127.0.0.1:2009']}\n"),
+            at(5, "dds: discovery_servers").beyond(9, 8));
 }
 
 TEST_F(ServerConfigTest, RefusesServerNamesThatTheWireCannotCarry) {

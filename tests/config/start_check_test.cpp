@@ -180,6 +180,29 @@ TEST_F(StartCheckTest, TheServerThatRunsAlreadyIsANote) {
   EXPECT_EQ(found.notes[1], "cell cell-7 has no model yet");
 }
 
+TEST_F(StartCheckTest, ACopyOfTheStoreIsLookedAtWhileTheServiceRuns) {
+  const auto running = test::demand(Store::open(folder_.file("t.db")));
+  static_cast<void>(test::demand(Store::open(folder_.file("copy.db"))));
+  const auto port = test::demand(PortLock::take("127.0.0.1", own_ports()));
+  ServerReading server = read_server(server_);
+  server.config.store = folder_.file("copy.db");
+  const StartCheck meant = check_start(server, server_);
+  ASSERT_EQ(meant.problems.size(), 1u) << "a start with this store would fail";
+  const StartCheck copy = check_start(server, server_, StoreToCheck::kCopy);
+  EXPECT_TRUE(copy.problems.empty()) << sentence(copy.problems.front());
+  ASSERT_EQ(copy.notes.size(), 3u);
+  EXPECT_NE(copy.notes[0].find("dds: port is in use"), std::string::npos) << copy.notes[0];
+  EXPECT_EQ(copy.notes[1], "cell cell-7 has no model yet");
+}
+
+TEST_F(StartCheckTest, AStoreThatIsWrittenMeanwhileIsLookedAtAllTheSame) {
+  const auto running = test::demand(Store::open(folder_.file("t.db")));
+  const StartCheck found = check_start(read_server(server_), server_, StoreToCheck::kCopy);
+  EXPECT_TRUE(found.problems.empty()) << sentence(found.problems.front());
+  ASSERT_EQ(found.notes.size(), 3u);
+  EXPECT_NE(found.notes[0].find("store is in use"), std::string::npos) << found.notes[0];
+}
+
 TEST_F(StartCheckTest, AFolderOfRecordsThatCannotBeMadeIsNamed) {
   write_server("record: {folder: cell-7.yaml/records}\n");
   expect_problem("server.yaml", "record: folder", "cell-7.yaml/records");

@@ -51,6 +51,21 @@ TEST(ClientNames, OnlyWhoWasLetInHasAName) {
   EXPECT_EQ(names.of("nobody"), "");
 }
 
+TEST(ClientNames, WhoIsRefusedIsToldByWhatItHasSaidOfItself) {
+  ClientNames names;
+  EXPECT_EQ(names.refused(kEngineer), "says nothing of itself");
+  names.announced(kEngineer, kClaim, "10.1.0.7");
+  EXPECT_EQ(names.refused(kEngineer), "says it is CN=engineer-1,O=Trammel, at 10.1.0.7");
+  names.announced(kEngineer2, "/CN=\nanna", "10.1.0.8");
+  const std::string forged = names.refused(kEngineer2);
+  EXPECT_TRUE(forged.ends_with(", which does not fit its GUID, at 10.1.0.8")) << forged;
+  EXPECT_EQ(forged.find('\n'), std::string::npos) << forged;
+  names.announced(kPrintable, "", "10.1.0.9");
+  EXPECT_EQ(names.refused(kPrintable), "shows no certificate, at 10.1.0.9");
+  names.left(kPrintable);
+  EXPECT_EQ(names.refused(kPrintable), "says nothing of itself") << "forgotten with the participant";
+}
+
 TEST(ClientNames, ANameIsForgottenOnceItsRequestsAreOver) {
   ClientNames names;
   const ClientNames::Time now{};

@@ -542,6 +542,64 @@ std::vector<PacketBytes> everything() {
       from().submessage(kSecurePrefix, 1, PacketBytes(20)).submessage(kSecurePostfix, 1, PacketBytes(20)).bytes()};
 }
 
+constexpr Prefix kRelay = {0x44, 0x53, 0, 0x5f, 0x45, 0x50, 0x52, 0x4f, 0x53, 0x49, 0x4d, 0x41};
+constexpr std::uint32_t kRelayAddress = 0x0a010003;
+constexpr std::uint64_t kRelaySocket = std::uint64_t{11811} << 32 | kRelayAddress;
+Guard beside_a_relay() { return Guard(kMaxTextSample, nullptr, {{kRelay, kRelayAddress}}); }
+
+/// `list` as `relay` passes it on, with the sequence number 7.
+PacketBytes passed_on(const ParameterList& list, const Prefix& relay = kRelay) {
+  return Packet(relay).data({0x000100c7, kAnnouncer, 7, {}, list.payload()}).bytes();
+}
+
+TEST(Guard, ADiscoveryServerAnnouncesOthers) {
+  Guard guard = beside_a_relay();
+  const PacketBytes announced = passed_on(participant());
+  const auto whole = guard.check(announced, kRelaySocket);
+  ASSERT_TRUE(whole);
+  EXPECT_TRUE(std::equal(whole->begin(), whole->end(), announced.begin(), announced.end()));
+  const PacketBytes leaves = ParameterList().guid(0x0070, kSource, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
+  EXPECT_TRUE(guard.check(Packet(kRelay).data({0, kAnnouncer, 8, leaves, {}}).bytes(), kRelaySocket)) << "they leave";
+}
+
+TEST(Guard, NobodyElseDoesSoInItsName) {
+  Guard guard = beside_a_relay();
+  Prefix second = kRelay;
+  second[2] = 1;
+  EXPECT_EQ(fate(guard, passed_on(participant())), Dropped::kSource) << "from another address";
+  EXPECT_FALSE(guard.check(passed_on(participant(), second), kRelaySocket)) << "another number";
+  EXPECT_FALSE(guard.check(passed_on(participant(), kOther), kRelaySocket)) << "from its address";
+  EXPECT_EQ(guard.counts().of(Dropped::kSource), 3u);
+  Guard usual(kMaxTextSample);
+  EXPECT_FALSE(usual.check(passed_on(participant()), kRelaySocket)) << "who asks no discovery server has none";
+}
+
+TEST(Guard, WhatADiscoveryServerMayNotPassOnIsSaidNotToExist) {
+  Guard guard = beside_a_relay();
+  PacketBytes too_long;  // user data of more bytes than it has
+  test::put32(too_long, 0xfffffff0);
+  const PacketBytes hostile = passed_on(participant().add(0x002c, too_long));
+  const auto whole = guard.check(hostile, kRelaySocket);
+  ASSERT_TRUE(whole) << "all that follows would wait for it";
+  const PacketBytes gap = Packet(kRelay).gap(0x000100c7, kAnnouncer, 7, 8).bytes();
+  const std::size_t length = kHeader + 2;  // the rest of the announcement stays behind it
+  ASSERT_EQ(whole->size(), hostile.size());
+  EXPECT_TRUE(std::equal(gap.begin(), gap.begin() + length, whole->begin()));
+  EXPECT_TRUE(std::equal(gap.begin() + length + 2, gap.end(), whole->begin() + length + 2));
+  Guard library_side(kMaxTextSample);
+  EXPECT_TRUE(library_side.check(*whole, kSocket));
+}
+
+TEST(Guard, ManyServersBehindOneDiscoveryServerAreNoFlood) {
+  Guard guard = beside_a_relay();
+  for (unsigned char i = 0; i < 100; ++i) {
+    Prefix one = kSource;
+    one[11] = i;
+    const auto list = ParameterList().guid(0x0050, one, 0x000001c1);
+    EXPECT_TRUE(guard.check(passed_on(list), kRelaySocket)) << int{i};
+  }
+}
+
 // Also the promise to the library: whatever passes is whole, and passes again.
 TEST(Guard, AMillionMutatedPacketsAreReadWithinTheirBytes) {
   const std::vector<PacketBytes> corpus = everything();

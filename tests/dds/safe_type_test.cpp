@@ -210,6 +210,7 @@ TEST(SafeType, TheShapeOfEveryReplyAndStateIsThatOfItsType) {
   copy.discarded(true);
   copy.learned(true);
   copy.outcome("it does not fit");
+  copy.accepted_at_unix_s(1'650'000'000);
   expect_shape<BatchCopyTopic::Type>(copy);
   BatchCopied copied;
   copied.result(RESULT_MALFORMED);

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "idl/places.h"
 #include "idl/transport.h"
 #include "server/base/name_check.h"
 #include "server/dds/dds_options.h"
@@ -53,6 +54,10 @@ TEST(WireDocument, WhatModelFilesMayHoldTheWireCanCarry) {
 
 TEST(WireDocument, TellsThePortsTimesAndLimitsOfTheCode) {
   const std::map<std::string, long long> constants = {{"kFirstPort", kFirstPort},
+                                                      {"kDiscoveryPort", kDiscoveryPort},
+                                                      {"kMostDiscoveryServers", kMostDiscoveryServers},
+                                                      {"kMostPlaces", kMostPlaces},
+                                                      {"kOtherPlaces", kOtherPlaces.count()},
                                                       {"kLease", kLease.count()},
                                                       {"kAnnouncement", kAnnouncement.count()},
                                                       {"kStatusPeriod", kStatusPeriod.count()},

@@ -142,13 +142,14 @@ void look_at_servers(const ServiceOptions& options, const std::vector<HostPort>&
   const bool any = std::any_of(places.begin(), places.end(), [](const HostPort& place) {
     return !is_of_this_host(place) || held_by_server(place.address, place.port);
   });
-  if (!any) return;  // the ports say so
+  if (!any && options.discovery_servers.empty()) return;  // the ports say so
   const auto session = open_session(options);
   const auto servers =
       session ? (*session)->servers() : Result<std::vector<client::ServerStatus>>(tl::make_unexpected(session.error()));
   if (!servers) {
-    found.push_back({"servers", State::kBad, servers.error().message,
-                     "its port is held, and it does not answer: is it of another --domain, or hung? read its log"});
+    const std::string hung =
+        "its port is held, and it does not answer: is it of another --domain, or hung? read its log";
+    found.push_back({"servers", State::kBad, servers.error().message, any ? hung : servers.error().next});
     return;
   }
   for (const client::ServerStatus& server : *servers) found.push_back(version_of(server));

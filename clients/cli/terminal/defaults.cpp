@@ -15,8 +15,8 @@ namespace trammel::cli {
 
 namespace {
 
-const std::vector<std::string> kNames = {"host", "port", "security", "domain", "timeout",
-                                         "cell", "tool", "payload",  "seed"};
+const std::vector<std::string> kNames = {"host", "discovery-server", "port", "security", "domain", "timeout", "cell",
+                                         "tool", "payload",          "seed"};
 
 struct Default {
   std::string name, value;

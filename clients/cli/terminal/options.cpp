@@ -15,6 +15,15 @@ namespace {
 
 constexpr double kLongestTimeout = 3600;  // s
 
+void add_discovery_option(CLI::App& command, ServiceOptions& options) {
+  command
+      .add_option("--discovery-server", options.discovery_servers,
+                  "A discovery server that tells where services are: a name or IPv4 address, with :PORT behind it or "
+                  "not; once for each, in the order of their numbers")
+      ->allow_extra_args(false)
+      ->group("Service");
+}
+
 void add_service_options(CLI::App& command, ServiceOptions& options, const std::string& help) {
   command.add_flag("--service", options.service, help)->group("Service");
   command
@@ -25,6 +34,8 @@ void add_service_options(CLI::App& command, ServiceOptions& options, const std::
       ->allow_extra_args(false)
       ->capture_default_str()
       ->group("Service");
+  command.get_option("--host")->each([&options](const std::string&) { options.hosts_said = true; });
+  add_discovery_option(command, options);
   command
       .add_option("--port", options.ports,
                   "UDP port of the service on each host that is named without one; once for each replica")
@@ -56,25 +67,36 @@ void add_options_of_service_command(CLI::App& command, ServiceOptions& options) 
   add_service_options(command, options, "Said or not: this command always asks a running trammeld");
 }
 
-Result<std::vector<HostPort>> places_of(const ServiceOptions& options) {
+Result<std::vector<HostPort>> discovery_servers_of(const ServiceOptions& options) {
   std::vector<HostPort> places;
-  for (const std::string& host : options.hosts) {
-    const bool has_port = host.find(':') != std::string::npos;
-    const std::size_t count = has_port ? 1 : options.ports.size();
-    for (std::size_t i = 0; i < count; ++i) {
-      auto place = parse_host_port(host, options.ports[i]);
-      if (!place) return Failure(std::move(place.error())).of("--host").next("name it as --host line-3:17500");
-      places.push_back(*std::move(place));
-    }
+  for (const std::string& text : options.discovery_servers) {
+    auto place = parse_host_port(text, kDiscoveryPort);
+    if (!place) return Failure(std::move(place.error())).of("--discovery-server").next("name it as line-3:11811");
+    if (std::find(places.begin(), places.end(), *place) != places.end())
+      return failure(ErrorCode::kUsage, "{} is given twice", text).of("--discovery-server").with_text(text);
+    places.push_back(*std::move(place));
   }
+  if (places.size() > kMostDiscoveryServers)
+    return failure(ErrorCode::kUsage, "{} discovery servers, limit {}", places.size(), kMostDiscoveryServers)
+        .of("--discovery-server");
+  return places;
+}
+
+Result<std::vector<HostPort>> places_of(const ServiceOptions& options) {
+  if (!options.discovery_servers.empty() && !options.hosts_said) return std::vector<HostPort>();
+  auto places = parse_hosts(options.hosts, options.ports);
+  if (!places) return Failure(std::move(places.error())).of("--host").next("name it as --host line-3:17500");
   return places;
 }
 
 Result<std::unique_ptr<client::Session>> open_session(const ServiceOptions& options) {
   auto places = places_of(options);
   if (!places) return tl::make_unexpected(places.error());
+  auto discovery_servers = discovery_servers_of(options);
+  if (!discovery_servers) return tl::make_unexpected(discovery_servers.error());
   client::SessionOptions session;
   session.servers = *std::move(places);
+  session.discovery_servers = *std::move(discovery_servers);
   session.security = options.security;
   session.domain = options.domain;
   session.timeout = std::chrono::milliseconds(static_cast<std::int64_t>(options.timeout_s * 1e3));
