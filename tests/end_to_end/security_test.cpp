@@ -308,6 +308,126 @@ TEST_F(SecurityTest, WhatIsWrongWithAFolderIsSaidBeforeAnythingIsSent) {
   EXPECT_EQ(client::check_security(good).value(), "CN=cam-1,O=Trammel");
 }
 
+TEST_F(SecurityTest, TheLogNamesWhoIsRefusedAlsoWhatTheStopCutsShort) {
+  Keys others;
+  const std::string stranger = others.of("engineer", "stranger"), later = others.of("engineer", "came-later");
+  daemon_.start();
+  expect_nobody(stranger);
+  EXPECT_TRUE(daemon_.process().wait_for_line("says it is CN=stranger,O=Trammel, at 127.0.0.1", kLimit));
+  expect_nobody(later);
+  daemon_.process().signal(SIGTERM);
+  EXPECT_TRUE(daemon_.process().wait_for_line("says it is CN=came-later,O=Trammel", kLimit));
+}
+
+TEST_F(SecurityTest, AServiceWithTheCertificateOfAClientIsToldWhichRoleItNeeds) {
+  const std::string text = test::read_file(daemon_.config_path());
+  const std::string folder = keys().of("cam", "cam-1"), service = keys().of("replica", "line-3");
+  ASSERT_TRUE(
+      write_text_file(daemon_.config_path(), std::string(text).replace(text.find(service), service.size(), folder)));
+  for (const bool check : {true, false}) {
+    std::vector<std::string> words = {test::trammeld_path(), "--config", daemon_.config_path()};
+    if (check) words.push_back("--check");
+    const auto done = test::run(words);
+    EXPECT_EQ(done.exit_code, 3);
+    EXPECT_NE(done.err.find("CN=cam-1,O=Trammel has the role cam, and a service needs the role replica"),
+              std::string::npos)
+        << done.err;
+    EXPECT_EQ(done.err.find("ServiceStatus"), std::string::npos) << done.err;
+  }
+}
+
+/// A plant of its own; what its script says, and whose certificates count there.
+class PlantTest : public testing::Test {
+ protected:
+  PlantTest() { EXPECT_EQ(keys("init").exit_code, 0); }
+  [[nodiscard]] std::string plant() const { return folder_.path().string(); }
+  /// `before` stands before the plant's folder, `words` behind it.
+  test::Finished keys(const std::string& before, std::vector<std::string> words = {}) const {
+    words.insert(words.begin(), {TRAMMEL_SOURCE_DIR "/deploy/security/keys", before, plant()});
+    return test::run(words);
+  }
+  void issue(const std::string& role, const std::string& name) const {
+    const auto done = keys("issue", {role, name});
+    ASSERT_EQ(done.exit_code, 0) << done.err;
+  }
+  /// The certificate is of this plant and was not revoked: as every service would hold it, once it has the list.
+  [[nodiscard]] bool counts(const std::string& certificate) const {
+    std::vector<std::string> words = {"/usr/bin/openssl", "verify", "-CAfile", of("bob") + "/identity_ca.cert.pem"};
+    if (fs::exists(plant() + "/authority/revoked.pem")) words.push_back("-crl_check");
+    words.push_back(certificate);
+    return test::run(words).exit_code == 0;
+  }
+  [[nodiscard]] std::string of(const std::string& name) const { return plant() + "/participants/" + name; }
+  /// The certificate that the participant has now, to compare with later ones.
+  [[nodiscard]] std::string kept(const std::string& name, const std::string& as) const {
+    fs::copy_file(of(name) + "/cert.pem", plant() + "/" + as);
+    return plant() + "/" + as;
+  }
+
+ private:
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(PlantTest, RevokingANameRevokesItsEarlierCertificatesToo) {
+  issue("cam", "bob");
+  issue("engineer", "anna");
+  const std::string first = kept("anna", "first.pem");
+  issue("engineer", "anna");
+  const std::string second = kept("anna", "second.pem");
+  ASSERT_TRUE(counts(first));
+  ASSERT_TRUE(counts(second));
+  fs::remove_all(of("anna"));  // was moved to its host
+  EXPECT_EQ(keys("revoke", {"anna"}).exit_code, 0);
+  EXPECT_FALSE(counts(first));
+  EXPECT_FALSE(counts(second));
+  EXPECT_TRUE(counts(of("bob") + "/cert.pem"));
+}
+
+TEST_F(PlantTest, ASecondRevocationSaysSo) {
+  issue("cam", "bob");
+  EXPECT_EQ(keys("revoke", {"bob"}).exit_code, 0);
+  const auto again = keys("revoke", {"bob"});
+  EXPECT_EQ(again.exit_code, 0);
+  EXPECT_NE(again.out.find("bob is revoked already"), std::string::npos) << again.out << again.err;
+  EXPECT_EQ(keys("revoke", {"nobody"}).exit_code, 2);
+}
+
+TEST_F(PlantTest, ARevokedNameMayComeBackInItsRoleAndOnlyItsNewCertificateCounts) {
+  issue("engineer", "bob");
+  const std::string old = kept("bob", "old.pem");
+  EXPECT_EQ(keys("revoke", {"bob"}).exit_code, 0);
+  issue("engineer", "bob");
+  EXPECT_FALSE(counts(old));
+  EXPECT_TRUE(counts(of("bob") + "/cert.pem"));
+}
+
+TEST_F(PlantTest, ANameKeepsItsRoleSinceItsOldPermissionsWouldCountBesideANewCertificate) {
+  issue("engineer", "anna");
+  const std::string certificate = test::read_file(of("anna") + "/cert.pem");
+  const auto refused = [&] {
+    const auto done = keys("issue", {"cam", "anna"});
+    EXPECT_EQ(done.exit_code, 2);
+    return done.err;
+  };
+  EXPECT_NE(refused().find("anna was engineer"), std::string::npos);
+  fs::remove(plant() + "/authority/roles");  // a plant from before roles were remembered
+  EXPECT_NE(refused().find("anna was engineer"), std::string::npos);
+  EXPECT_EQ(test::read_file(of("anna") + "/cert.pem"), certificate) << "nothing was changed";
+  EXPECT_EQ(keys("revoke", {"anna"}).exit_code, 0);
+  EXPECT_NE(refused().find("anna was engineer"), std::string::npos) << "its permissions are still about";
+  fs::remove_all(of("anna"));
+  EXPECT_NE(refused().find("has had a certificate"), std::string::npos) << "and nothing says of which role";
+}
+
+TEST_F(PlantTest, ACertificateThatHasEndedBeforeItBeginsIsNotIssued) {
+  for (const auto& [option, value] : {std::pair{"--until", "2020-01-31T12:00:00Z"}, {"--days", "0"}, {"--days", "x"}}) {
+    const auto done = keys("issue", {"cam", "carl", option, value});
+    EXPECT_EQ(done.exit_code, 2) << value;
+    EXPECT_NE(done.err.find(value[0] == 'x' ? "a whole number" : "has passed"), std::string::npos) << done.err;
+    EXPECT_FALSE(fs::exists(of("carl"))) << value;
+  }
+}
+
 TEST(SecurityOfTheServerFile, AnAddressThatOthersReachNeedsCertificatesOrASecondWord) {
   const test::Daemon daemon;
   const std::string text = test::read_file(daemon.config_path());
