@@ -251,6 +251,8 @@ Status Model::save(const std::string& path) const {
   return {};
 }
 
+std::string Model::text() const { return serialize(inside_->model); }
+
 ModelFacts Model::facts() const {
   const ModelProvenance& from = inside_->model.provenance();
   return {from.id, from.hash, inside_->model.cell().name, from.level, from.batch_id, from.training_poses, 0, false};

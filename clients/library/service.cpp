@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "clients/library/convert.h"
 #include "clients/session/session.h"
+#include "server/base/host_port.h"
 #include "server/base/mutex.h"
 #include "server/base/units.h"
 #include "server/compensate/model_file.h"
@@ -139,6 +141,10 @@ Result<Session> Session::open(const SessionOptions& options) {
   how.domain = options.domain;
   how.server_ports = options.ports;
   how.timeout = std::min(options.timeout, kLongestTimeout);
+  how.security = options.security;
+  auto places = parse_hosts(options.hosts, options.ports);
+  if (!places) return tl::make_unexpected(library::to_api(Failure(places.error()).of("hosts").value()));
+  how.servers = *std::move(places);
   auto session = client::Session::open(how);
   if (!session) return passed_on(session);
   auto inside = std::make_unique<Inside>();
@@ -207,6 +213,34 @@ Result<std::int64_t> Session::submit(const std::string& cell, const std::string&
   return *job;
 }
 
+Result<std::int64_t> Session::retrain(const std::string& cell, const std::vector<std::string>& batch_ids,
+                                      const std::string& level, const std::string& bias) const {
+  const auto job = inside_->session->train(cell, batch_ids, level, bias);
+  if (!job) return passed_on(job);
+  return *job;
+}
+
+Result<std::int64_t> Session::diagnose(const std::string& cell, const std::string& batch_id,
+                                       const std::string& csv) const {
+  const auto job = inside_->session->diagnose(cell, batch_id, csv, false);
+  if (!job) return passed_on(job);
+  return *job;
+}
+
+Result<std::int64_t> Session::check(const std::string& cell, const std::string& batch_id, const std::string& csv,
+                                    std::optional<double> tolerance_mm) const {
+  const double as_the_cell_says = std::numeric_limits<double>::quiet_NaN();
+  const auto job = inside_->session->check_health(cell, batch_id, csv, tolerance_mm.value_or(as_the_cell_says));
+  if (!job) return passed_on(job);
+  return *job;
+}
+
+Result<std::string> Session::findings(const std::string& cell, std::int64_t job) const {
+  auto answer = inside_->session->diagnosis(cell, job, false);
+  if (!answer) return passed_on(answer);
+  return std::move(answer->findings_json);
+}
+
 Result<Job> Session::wait_for(std::int64_t job, std::chrono::milliseconds limit,
                               const std::function<void(const Job&)>& listener) const {
   const auto last = inside_->session->wait_for_job(job, limit, [&](const client::JobStatus& status) {
@@ -230,6 +264,12 @@ Result<int> Session::activate(const std::string& cell, int version, const std::s
   const auto now = inside_->session->activate(cell, version, change);
   if (!now) return passed_on(now);
   return *now;
+}
+
+Result<int> Session::import_model(const std::string& cell, const std::string& text) const {
+  const auto version = inside_->session->import_model(cell, text);
+  if (!version) return passed_on(version);
+  return *version;
 }
 
 Result<int> Session::roll_back(const std::string& cell, const std::string& reason) const {

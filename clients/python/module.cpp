@@ -342,6 +342,7 @@ void add_model_file(py::class_<api::Model>& type) {
             value_or_raise(unlocked([&] { return model.save(path); }));
           },
           "path"_a)
+      .def("text", [](const api::Model& model) { return unlocked([&] { return model.text(); }); })
       .def("facts", [](const api::Model& model) { return to_python(model.facts()); })
       .def("cell", &api::Model::cell)
       .def("bias", &api::Model::bias)
@@ -429,15 +430,34 @@ std::chrono::milliseconds milliseconds(double seconds) {
 
 using api::Session;
 
+/// Session::wait_for() in slices, so that Ctrl-C ends it at once.
+api::Job waited_for(const Session& session, std::int64_t job, std::chrono::milliseconds limit) {
+  constexpr std::chrono::milliseconds kSlice{200};
+  const auto until = std::chrono::steady_clock::now() + limit;
+  bool was_there = false;  // from then on a server that does not answer is waited for
+  while (true) {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(until - std::chrono::steady_clock::now());
+    auto ended = unlocked([&] {
+      return session.wait_for(job, std::clamp(left, std::chrono::milliseconds(0), kSlice),
+                              [&](const api::Job&) { was_there = true; });
+    });
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    const bool goes_on = !ended && ended.error().code == api::ErrorCode::kUnreachable && was_there && left > kSlice;
+    if (!goes_on) return value_or_raise(std::move(ended));
+  }
+}
+
 void add_session_state(py::class_<Session>& session) {
   session
       .def_static(
           "open",
-          [](std::uint32_t domain, std::vector<std::uint16_t> ports, double timeout_s) {
-            const api::SessionOptions options{domain, std::move(ports), milliseconds(timeout_s)};
+          [](std::uint32_t domain, std::vector<std::uint16_t> ports, double timeout_s, std::vector<std::string> hosts,
+             std::string security) {
+            const api::SessionOptions options{domain, std::move(ports), milliseconds(timeout_s), std::move(hosts),
+                                              std::move(security)};
             return value_or_raise(unlocked([&] { return Session::open(options); }));
           },
-          "domain"_a, "ports"_a, "timeout_s"_a)
+          "domain"_a, "ports"_a, "timeout_s"_a, "hosts"_a, "security"_a)
       .def("servers", [](const Session& s) { return list_of(value_or_raise(unlocked([&] { return s.servers(); }))); })
       .def(
           "models",
@@ -482,6 +502,42 @@ void add_session_work(py::class_<Session>& session) {
           "cell"_a, "pose"_a, "joints_deg"_a, "conf"_a, "tool"_a, "payload"_a, "directions"_a, "temperature_c"_a);
 }
 
+void add_session_care(py::class_<Session>& session) {
+  session
+      .def(
+          "retrain",
+          [](const Session& s, const std::string& cell, const std::vector<std::string>& batch_ids,
+             const std::string& level, const std::string& bias) {
+            return value_or_raise(unlocked([&] { return s.retrain(cell, batch_ids, level, bias); }));
+          },
+          "cell"_a, "batch_ids"_a, "level"_a, "bias"_a)
+      .def(
+          "diagnose",
+          [](const Session& s, const std::string& cell, const std::string& batch_id, const std::string& csv) {
+            return value_or_raise(unlocked([&] { return s.diagnose(cell, batch_id, csv); }));
+          },
+          "cell"_a, "batch_id"_a, "csv"_a)
+      .def(
+          "check",
+          [](const Session& s, const std::string& cell, const std::string& batch_id, const std::string& csv,
+             std::optional<double> tolerance_mm) {
+            return value_or_raise(unlocked([&] { return s.check(cell, batch_id, csv, tolerance_mm); }));
+          },
+          "cell"_a, "batch_id"_a, "csv"_a, "tolerance_mm"_a)
+      .def(
+          "findings",
+          [](const Session& s, const std::string& cell, std::int64_t job) {
+            return value_or_raise(unlocked([&] { return s.findings(cell, job); }));
+          },
+          "cell"_a, "job"_a)
+      .def(
+          "import_model",
+          [](const Session& s, const std::string& cell, const std::string& text) {
+            return value_or_raise(unlocked([&] { return s.import_model(cell, text); }));
+          },
+          "cell"_a, "text"_a);
+}
+
 void add_session_changes(py::class_<Session>& session) {
   session
       .def(
@@ -493,7 +549,7 @@ void add_session_changes(py::class_<Session>& session) {
       .def(
           "wait_for",
           [](const Session& s, std::int64_t job, double limit_s) {
-            return to_python(value_or_raise(unlocked([&] { return s.wait_for(job, milliseconds(limit_s)); })));
+            return to_python(waited_for(s, job, milliseconds(limit_s)));
           },
           "job"_a, "limit_s"_a)
       .def(
@@ -536,6 +592,7 @@ PYBIND11_MODULE(_trammel, m) {
   add_session_state(session);
   add_session_work(session);
   add_session_changes(session);
+  add_session_care(session);
 }
 
 }  // namespace trammel::python

@@ -124,6 +124,8 @@ class TRAMMEL_API Model {
   [[nodiscard]] static Result<Model> parse(const std::string& text, const std::string& where);
   /// Writes the model file, whole or not at all.
   [[nodiscard]] Status save(const std::string& path) const;
+  /// The text of that file.
+  [[nodiscard]] std::string text() const;
 
   /// Its id, cell, level and batch.
   [[nodiscard]] ModelFacts facts() const;

@@ -18,8 +18,13 @@ namespace trammel::api {
 /// Where the service is.
 struct SessionOptions {
   std::uint32_t domain = 0;                    ///< DDS domain, 0 to 232
-  std::vector<std::uint16_t> ports = {17500};  ///< UDP ports on 127.0.0.1, one per replica
+  std::vector<std::uint16_t> ports = {17500};  ///< UDP ports on each host that is named without one, one per replica
   std::chrono::milliseconds timeout{5000};     ///< of one request, discovery included
+  /// The hosts of the service, names or IPv4 addresses, with `:port` behind them or not. Empty: this host, on
+  /// 127.0.0.1.
+  std::vector<std::string> hosts = {};
+  /// Folder with the certificate, key and permissions that a secured service asks for; empty: without.
+  std::string security = {};
 };
 
 /// What a call is about.
@@ -91,6 +96,20 @@ class TRAMMEL_API Session {
   /// the same submission.
   [[nodiscard]] Result<std::int64_t> submit(const std::string& cell, const std::string& batch_id,
                                             const std::string& csv) const;
+  /// Trains from stored batches (empty: the newest) and returns the job. `level` and `bias`
+  /// instead of what the cell asks for; empty: as it asks.
+  [[nodiscard]] Result<std::int64_t> retrain(const std::string& cell, const std::vector<std::string>& batch_ids = {},
+                                             const std::string& level = {}, const std::string& bias = {}) const;
+  /// Asks what the cell's model lacks by a stored batch (its id; empty: the newest) or, with `csv`, by measurements
+  /// that are not kept. Returns the job; once it is done, findings() has what `trammel diagnose --json` prints.
+  [[nodiscard]] Result<std::int64_t> diagnose(const std::string& cell, const std::string& batch_id = {},
+                                              const std::string& csv = {}) const;
+  /// Asks whether the robot is still as its model in force has it, by a few poses, stored or in `csv`. `tolerance_mm`
+  /// instead of what the cell holds. Returns the job; then findings() has what `trammel check --json` prints.
+  [[nodiscard]] Result<std::int64_t> check(const std::string& cell, const std::string& batch_id = {},
+                                           const std::string& csv = {}, std::optional<double> tolerance_mm = {}) const;
+  /// What a diagnosis or a check that is done has found: JSON.
+  [[nodiscard]] Result<std::string> findings(const std::string& cell, std::int64_t job) const;
   /// Waits until the job is done or failed, and tells `listener`, if any, how far it is. kUnreachable: `limit` is over.
   /// kNotFound: no server knows it.
   [[nodiscard]] Result<Job> wait_for(std::int64_t job, std::chrono::milliseconds limit,
@@ -100,6 +119,8 @@ class TRAMMEL_API Session {
   /// Puts a version in force; refused where `expected_version` is not. `reason` is for the audit trail.
   [[nodiscard]] Result<int> activate(const std::string& cell, int version, const std::string& reason = {},
                                      std::optional<int> expected_version = {}) const;
+  /// Adds a model file's text to the history of its cell; activate() puts it in force. Returns its version.
+  [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text) const;
   /// Puts the version before in force again, and returns it.
   [[nodiscard]] Result<int> roll_back(const std::string& cell, const std::string& reason = {}) const;
 

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _trammel
-from .arrays import POSE, Floats, Frame, branches, floats, one_each
+from .arrays import POSE, Floats, Frame, branches, floats, one_each, whole
 from .errors import (Busy, Conflict, Internal, NotFound, Refused, TooLarge, TrammelError, Unreachable, Usage)
 
 if TYPE_CHECKING:
@@ -203,16 +203,21 @@ class Batch:
 
     @staticmethod
     def from_arrays(joints_deg: npt.ArrayLike, position_mm: npt.ArrayLike, name: str = "batch",
-                    orientation: Optional[npt.ArrayLike] = None, **columns: Union[Sequence[object], npt.ArrayLike]) -> "Batch":
+                    orientation: Optional[npt.ArrayLike] = None, rails: Sequence[int] = (),
+                    **columns: Union[Sequence[object], npt.ArrayLike]) -> "Batch":
         """From arrays: `joints_deg` (N, n) as commanded, `position_mm` (N, 3) measured in W or B, `orientation` (N, 4)
-        unit quaternions `qw, qx, qy, qz`. More columns of a batch file come by their names, N values or one for all:
-        `pose_id=..., sigma_mm=..., temperature_c=..., session_id=...`. Rails (mm) need a file or a frame."""
+        unit quaternions `qw, qx, qy, qz`. `rails`: the numbers, from 1, of the joints that are rails; theirs are mm. More
+        columns of a batch file come by their names, N values or one for all: `pose_id=..., sigma_mm=...,
+        temperature_c=..., session_id=...`."""
         joints = floats(joints_deg, "joints_deg")
         position = floats(position_mm, "position_mm")
         if joints.ndim != 2 or position.shape != (len(joints), 3):
             raise Usage(f"joints_deg {joints.shape} and position_mm {position.shape}: (N, n) and (N, 3) are needed")
         parts = [joints, position]
-        names = [f"q{j + 1}_deg" for j in range(joints.shape[1])] + ["x_mm", "y_mm", "z_mm"]
+        wrong = [rail for rail in rails if not 1 <= rail <= joints.shape[1]]
+        if wrong:
+            raise Usage(f"rails: joint {wrong[0]} of 1 to {joints.shape[1]}")
+        names = [f"q{j}_mm" if j in rails else f"q{j}_deg" for j in range(1, joints.shape[1] + 1)] + ["x_mm", "y_mm", "z_mm"]
         if orientation is not None:
             turned = floats(orientation, "orientation")
             if turned.shape != (len(joints), 4):
@@ -274,6 +279,15 @@ def _inside_of(batches: Batches) -> List[_trammel.Batch]:
     return [one._inside for one in several]
 
 
+def _id_and_text(batch: Union[Batch, str]) -> Tuple[str, str]:
+    """What names a batch to a service: the id of a stored one, or measurements."""
+    if isinstance(batch, str):
+        return batch, ""
+    if not isinstance(batch, Batch):
+        raise _wrong_kind("batch", batch, "a Batch (Batch.load(path)) or the id of a stored one")
+    return "", batch.csv()
+
+
 class Model:
     """Nominal chain, identified error sources and learned bias. Immutable."""
 
@@ -294,6 +308,10 @@ class Model:
     def save(self, path: Path) -> None:
         """Writes the model file, whole or not at all."""
         self._inside.save(os.fspath(path))
+
+    def text(self) -> str:
+        """The text of the model file."""
+        return self._inside.text()
 
     @property
     def id(self) -> str:
@@ -366,36 +384,44 @@ def train(cell: Cell, batches: Batches, level: Optional[str] = None, bias: Optio
           validation_share: float = 0.0, progress: Optional[Progress] = None) -> Model:
     """A model of `cell`. `level` (`M0` to `M3`, `M2,gear_transmission:3`) and `bias` (`none`, `auto`, a kernel) instead
     of what the cell file says; `validation_share` of the rows are held out where the batch has no column `set`."""
-    return Model(_trammel.train(_inside_cell(cell), _inside_of(batches), level, bias, seed, validation_share, progress))
+    return Model(_trammel.train(_inside_cell(cell), _inside_of(batches), level, bias, whole(seed, "seed"), validation_share,
+                                progress))
 
 
 def diagnose(cell: Cell, batches: Batches, seed: int = 1, progress: Optional[Progress] = None) -> Dict[str, Any]:
     """What the cell's model lacks, with the keys of `trammel diagnose --json`."""
-    found: Dict[str, Any] = json.loads(_trammel.diagnose(_inside_cell(cell), _inside_of(batches), seed, progress))
+    found: Dict[str, Any] = json.loads(_trammel.diagnose(_inside_cell(cell), _inside_of(batches), whole(seed, "seed"), progress))
     return found
 
 
 def plan(cell: Cell, count: int, seed: int = 1, criterion: str = "lhs", positions_only: bool = False) -> Plan:
     """`count` poses to measure, inside the cell's workspace and in sight of its tracker. `criterion`: `lhs`,
     `observability`, `separate:CAUSE,CAUSE`, `check`. `positions_only`: for a single reflector."""
-    return Plan(**_trammel.plan(_inside_cell(cell), count, seed, criterion, positions_only))
+    return Plan(**_trammel.plan(_inside_cell(cell), whole(count, "count", 1), whole(seed, "seed"), criterion, positions_only))
 
 
 def simulate(cell: Cell, truth: Path, planned: Union[Plan, str], seed: int = 1, positions_only: bool = False,
              noise_free: bool = False) -> Batch:
     """Measures a plan (or its CSV) on a virtual robot; `truth` is a truth file: what is really wrong with the robot."""
     text = planned.csv if isinstance(planned, Plan) else planned
-    return Batch(_trammel.simulate(_inside_cell(cell), os.fspath(truth), text, seed, positions_only, noise_free))
+    return Batch(_trammel.simulate(_inside_cell(cell), os.fspath(truth), text, whole(seed, "seed"), positions_only, noise_free))
 
 
 class Session:
-    """One client of a running service, on 127.0.0.1; one per process is enough, and a forked process opens its own. Raises
-    `Unreachable` where no server answers within `timeout_s`."""
+    """One client of a running service; one per process is enough, and a forked process opens its own. Raises
+    `Unreachable` where no server answers within `timeout_s`.
 
-    def __init__(self, domain: int = 0, ports: Sequence[int] = (17500,), timeout_s: float = 5.0) -> None:
+    `hosts`: where its servers are, names or IPv4 addresses, with `:port` behind them or not; empty: this host, on
+    127.0.0.1. `ports`: those of each host that is named without one. `security`: the folder with certificate, key and
+    permissions that a secured service asks for.
+    """
+
+    def __init__(self, domain: int = 0, ports: Sequence[int] = (17500,), timeout_s: float = 5.0,
+                 hosts: Union[str, Sequence[str]] = (), security: Path = "") -> None:
         if not 0 < timeout_s < float("inf"):
             raise Usage(f"timeout_s is {timeout_s}: a number of seconds above 0 is needed")
-        self._inside = _trammel.Session.open(domain, list(ports), timeout_s)
+        named = [hosts] if isinstance(hosts, str) else list(hosts)
+        self._inside = _trammel.Session.open(domain, list(ports), timeout_s, named, os.fspath(security))
 
     def status(self) -> List[Dict[str, Any]]:
         """The servers that are there: `id version state cells trouble uptime_s queued_jobs`."""
@@ -433,6 +459,36 @@ class Session:
     def wait_for(self, job: int, limit_s: float = 600.0) -> Dict[str, Any]:
         """Waits until the job is done or failed: `id cell stage what share verdict version in_force why next`."""
         return self._inside.wait_for(job, limit_s)
+
+    def retrain(self, cell: str, batch_ids: Sequence[str] = (), level: str = "", bias: str = "") -> int:
+        """Trains from stored batches (none: the newest) and returns the job. `level` and `bias` instead of the cell's."""
+        return self._inside.retrain(cell, list(batch_ids), level, bias)
+
+    def diagnose(self, cell: str, batch: Union[Batch, str] = "", limit_s: float = 600.0) -> Dict[str, Any]:
+        """What the cell's model lacks, with the keys of `trammel diagnose --json`. `batch`: the id of a stored one (empty:
+        the newest), or measurements, which are not kept. Waits; raises `Refused` with the reason where the job fails."""
+        job = self._inside.diagnose(cell, *_id_and_text(batch))
+        return self._findings(cell, job, limit_s)
+
+    def check(self, cell: str, batch: Union[Batch, str] = "", tolerance_mm: Optional[float] = None,
+              limit_s: float = 600.0) -> Dict[str, Any]:
+        """Whether the robot is still as the model in force has it, by a few poses, with the keys of `trammel check --json`.
+        `batch` as in `diagnose()`; `tolerance_mm` instead of what the cell holds."""
+        job = self._inside.check(cell, *_id_and_text(batch), tolerance_mm)
+        return self._findings(cell, job, limit_s)
+
+    def _findings(self, cell: str, job: int, limit_s: float) -> Dict[str, Any]:
+        ended = self.wait_for(job, limit_s)
+        if ended["stage"] != "done":
+            raise Refused(f"job {job} of cell {cell}: {ended['why'] or ended['what']}", {"code": "refused", "next": ended["next"]})
+        found: Dict[str, Any] = json.loads(self._inside.findings(cell, job))
+        return found
+
+    def import_model(self, cell: str, model: Model) -> int:
+        """Adds a model to the history of its cell; `activate()` puts it in force. Returns its version."""
+        if not isinstance(model, Model):
+            raise _wrong_kind("model", model, "a Model (Model.load(path))")
+        return self._inside.import_model(cell, model.text())
 
     def jobs(self, cell: str = "") -> List[Dict[str, Any]]:
         """Jobs that wait or run or ended lately, oldest first."""

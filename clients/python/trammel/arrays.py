@@ -40,6 +40,13 @@ def branches(conf: Any) -> Optional[npt.NDArray[np.int32]]:
     return np.clip(values, -1, 2**30).astype(np.int32)  # beyond 7 is refused with its row
 
 
+def whole(value: Any, argument: str, least: int = 0) -> int:
+    """A whole number from `least`."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not least <= value < 2**63:
+        raise Usage(f"{argument} is {value!r}: a whole number from {least} is needed")
+    return int(value)
+
+
 def one_each(column: str, values: Any, poses: int) -> List[str]:
     """A column of a file: `poses` values, or one that is the same for all."""
     if isinstance(values, str) or not hasattr(values, "__iter__"):
