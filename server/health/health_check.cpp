@@ -30,15 +30,15 @@ using health::Hypothesis;
 using health::RefittedRows;
 using health::Sifted;
 
-constexpr int kMostCauses = 3;        // that a check may name
-constexpr int kRounds = 3;            // of looking at each of them again beside the others
-constexpr double kAlike = 6;          // of scores: odds of e^3
-constexpr double kCredible = 0.99;    // of all single causes' odds: those that could be it have it together
-constexpr double kUnlinear = 0.003;   // of an effect
-constexpr double kDoubtful = 0.02;    // chance from which on nothing is said for certain
-constexpr double kNearlySeen = 10;    // times the limit: a cause that is named where the whole is beyond chance
-constexpr double kExtrapolated = 10;  // times what the poses are off by: an effect that large is not seen in them
-constexpr double kFarOff = 5e-3;      // m rms, base refitted: no small change, and effects are no longer linear
+constexpr int kMostCauses = 3;         // that a check may name
+constexpr int kRounds = 3;             // of looking at each of them again beside the others
+constexpr double kAlike = 6;           // of scores: odds of e^3
+constexpr double kCredible = 0.99;     // of all single causes' odds: those that could be it have it together
+constexpr double kUnlinear = 0.003;    // of an effect
+constexpr double kDoubtful = 0.02;     // chance from which on nothing is said for certain
+constexpr double kNearlySeen = 10;     // times the limit: a cause that is named where the whole is beyond chance
+constexpr double kExtrapolated = 10;   // times what the poses are off by: an effect that large is not seen in them
+constexpr double kFarOff = kNeverOff;  // m rms, base refitted: no small change, and effects are no longer linear
 
 Eigen::MatrixXd joined(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other) {
   Eigen::MatrixXd both(one.rows(), one.cols() + other.cols());
@@ -499,10 +499,14 @@ std::string Examination::seen_in_words() const {
 
 void Examination::tell_verdict() {
   const double tolerance = to_mm(options_.tolerance);
+  // Far beyond anything expected is never chance, whatever the tails of the model's errors are.
+  if (check_.changed.empty() && check_.rms > std::max(kFarOff, kNeverExpected * check_.expected_rms))
+    is_too_far_ = true;
   if (is_too_far_) {
     check_.sentence = fmt::format(
-        "the poses are off by {:.1f} mm rms, which no small change explains: was the file read as it was meant, is it "
-        "this robot, is it this tool? `diagnose` says more",
+        "the poses are off by {:.1f} mm rms, which no small change explains: was the file read as it was meant "
+        "(measurements, "
+        "not targets; no rows or columns exchanged), is it this robot, is it this tool? `diagnose` says more",
         to_mm(check_.rms));
   } else if (!check_.changed.empty()) {
     check_.verdict = HealthVerdict::kChanged;

@@ -8,6 +8,7 @@
 #include "server/base/result.h"
 #include "server/compensate/compensated_model.h"
 #include "server/health/drift.h"
+#include "server/health/foreign_poses.h"
 #include "server/measurement/checked_batch.h"
 #include "server/plan/check_design.h"
 

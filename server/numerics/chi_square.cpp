@@ -8,6 +8,7 @@ namespace trammel {
 namespace {
 
 constexpr double kNegligible = 1e-12;  // share of the noncentral mixture that may be left out
+constexpr double kCertain = 8.3;       // standard deviations: 1 to rounding
 constexpr int kMostTerms = 20000;
 
 /// What two more degrees of freedom add to the tail: (x/2)^(k/2) e^(-x/2) / Gamma(k/2 + 1).
@@ -28,6 +29,8 @@ double chi_square_tail(double x, int freedom) {
 // A mixture of central ones with 2j degrees of freedom more, j from Poisson's distribution.
 double chi_square_tail(double x, int freedom, double noncentrality) {
   if (!(noncentrality > 0)) return chi_square_tail(x, freedom);
+  // Along the shift alone: less than x has at most the chance of a normal number below sqrt(x) - sqrt(noncentrality).
+  if (std::sqrt(noncentrality) - std::sqrt(std::max(x, 0.0)) > kCertain) return 1;
   const double mean = 0.5 * noncentrality;
   const int first = std::max(0, static_cast<int>(mean - 10 * std::sqrt(mean) - 10));
   double central = chi_square_tail(x, freedom + 2 * first);

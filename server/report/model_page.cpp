@@ -258,16 +258,18 @@ std::string learning_text(const std::optional<LearningCurve>& curve) {
 
 std::string model_page(const CompensatedModel& model, const std::optional<MeasurementBatch>& batch) {
   const Compared compared = compared_with(model, batch);
-  const std::optional<PositionAccuracy> accuracy = PositionAccuracy::of(model, batch);
+  std::optional<PositionAccuracy> accuracy = PositionAccuracy::of(model, batch);
+  const std::optional<std::string> no_promise = why_no_promise(model, accuracy, batch);
+  if (no_promise) accuracy.reset();
   const ShownPoses shown = poses_to_show(model, batch);
-  const std::optional<LearningCurve> curve = learning_curve(model);
+  const std::optional<LearningCurve> curve = no_promise ? std::nullopt : learning_curve(model);
   const std::string title = html_text(fmt::format("Cell {}: model {}", model.cell().name, model.provenance().id));
   return fill_in(embedded::model_page_html,
                  {{"title", title},
                   {"mark", page_mark({"model", model.cell().name, model.provenance().id})},
                   {"subtitle", html_text(fmt::format("{} · {}", model.cell().robot.name(),
                                                      date_of(model.provenance().trained_at)))},
-                  {"promise", html_text(promise_sentence(model, accuracy))},
+                  {"promise", html_text(no_promise ? *no_promise : promise_sentence(model, accuracy))},
                   {"certificate", certificate(model, accuracy, batch)},
                   {"tiles", tiles(compared.evaluation)},
                   {"warnings", warnings(model, compared.evaluation)},

@@ -5,6 +5,7 @@
 
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
+#include "server/health/health_check.h"
 #include "server/measurement/pose_columns.h"
 #include "server/measurement/repeats.h"
 #include "server/report/html.h"
@@ -17,6 +18,9 @@ namespace trammel {
 namespace {
 
 constexpr int kFewestToJudge = 10;  // fresh poses: with fewer the promise says by how many it was tested
+/// Degrees of freedom of the residuals: with fewer their rms may be wrong by half and more (1 / sqrt(2 k) is 22 % of it
+/// at 10), and nothing else says how far the model is off.
+constexpr double kFewestFreedom = 10;
 constexpr std::int64_t kDay = 86400;
 /// How long a model is taken for good where no check has told how fast its arm drifts, days.
 constexpr std::int64_t kFirstCheck = 30;
@@ -155,7 +159,7 @@ std::string tolerance_table(const PositionAccuracy& accuracy, const std::optiona
                      held(accuracy, tolerance), share_text(accuracy.within(tolerance))},
                     asked ? "asked" : ""});
   }
-  return html_table({"tolerances", {"may I ask for", "at 95 % of positions?", "positions inside"}, rows});
+  return html_table({"tolerances", {"may I ask for", "at 95 % of positions?", "positions that near the target"}, rows});
 }
 
 std::string tolerance_sentence(const PositionAccuracy& accuracy, const std::optional<double>& of_cell) {
@@ -174,7 +178,50 @@ std::string hardly_judged(const PositionAccuracy& accuracy) {
   return fmt::format(", tested by {} fresh pose{} only", accuracy.judged_by(), accuracy.judged_by() == 1 ? "" : "s");
 }
 
+/// How many parameters the measurements determine: P - tr(prior^-1 posterior) (MacKay, Bayesian Interpolation, 1992),
+/// and where the instrument stood in each further session.
+double determined(const ModelParts& parts) {
+  double sum = parts.sessions.empty() ? 0 : 6 * (static_cast<double>(parts.sessions.size()) - 1);
+  for (const IdentifiedParameter& one : parts.parameters)
+    sum += 1 - std::min(1.0, std::pow(one.stddev / one.parameter.prior_scale, 2));
+  return sum;
+}
+
+/// Coordinates of positions (and distances) that were trained on, less their share of what was determined from them and
+/// from orientations; three more for every pose that was not trained on.
+double freedom_left(const CompensatedModel& model, const PositionAccuracy& accuracy) {
+  const ModelParts& parts = model.parts();
+  const double gauges = parts.training.gauges ? parts.training.gauges->rows : 0;
+  const double positions = std::max<double>(parts.training.poses, parts.provenance.training_poses - gauges);
+  const double told = 3 * positions + gauges;
+  const bool oriented = parts.training.orientation && parts.oriented_poses == 0;
+  const double all = told + (oriented ? 3 * parts.training.orientation->poses : 0);
+  const double left = all > 0 ? told * std::max(0.0, 1 - determined(parts) / all) : 0;
+  return left + 3 * accuracy.judged_by();
+}
+
 }  // namespace
+
+std::optional<std::string> why_no_promise(const CompensatedModel& model,
+                                          const std::optional<PositionAccuracy>& accuracy,
+                                          const std::optional<MeasurementBatch>& batch) {
+  if (batch) {
+    if (const auto foreign = foreign_poses(model, *batch))
+      return "Nothing can be promised by these measurements: " + *foreign;
+  }
+  if (!accuracy || freedom_left(model, *accuracy) >= kFewestFreedom) return std::nullopt;
+  const int poses = model.provenance().training_poses;
+  return fmt::format(
+      "How good this model is cannot be said from so few poses: it was trained on {} for {} parameters, and {}. "
+      "Measure "
+      "more (trammel plan chooses the poses), train again, and give trammel report --batch at least {} that were not "
+      "trained on.",
+      poses, model.parts().parameters.size(),
+      accuracy->judged_by() == 0 ? std::string("none was held out")
+                                 : fmt::format("{} that {} not trained on are too few", accuracy->judged_by(),
+                                               accuracy->judged_by() == 1 ? "was" : "were"),
+      kFewestToJudge);
+}
 
 std::string rounded_up_mm(double length) {
   const double mm = to_mm(length);
@@ -198,15 +245,17 @@ std::string certificate(const CompensatedModel& model, const std::optional<Posit
   const std::string late = overdue(model.provenance());
   const std::optional<double> tolerance = rules_of(model.cell()).value_or(CellRules{}).tolerance;
   return late + tolerance_sentence(*accuracy, tolerance) + tolerance_table(*accuracy, tolerance) +
-         "\n<p>This holds in the volume and with the tool and payload named below, for targets that <code>trammel "
-         "correct</code> has corrected; of each it says whether it is inside that volume and what error to expect. "
-         "Not in it: how well the part is located, forces of the process, wear of the tool, and a robot that has "
+         "\n<p>Distances are from the wanted position (half of a true position's diameter). This holds in the volume "
+         "and with the tool and payload named below, for targets that <code>trammel correct</code> has corrected; it "
+         "says of each target whether it is inside that volume and what error to expect. "
+         "Not counted: how well the part is located, forces of the process, wear of the tool, and a robot that has "
          "changed since.</p>\n<h3>In numbers</h3>\n" +
          iso_table(model, *accuracy, batch) + "\n<h3>Of what</h3>\n" + papers +
          fmt::format(
-             "\n<p class=\"note\">Of the true position of the tool after correction by this model, the "
-             "instrument's noise taken out, at fresh poses of the domain; not ISO's five poses. Taken for good "
-             "for {} days, until a check (<code>trammel check</code>) tells how fast this robot changes. A "
+             "\n<p class=\"note\">The figures are of the tool's true position after correction by this model, at any "
+             "fresh "
+             "pose of the volume, not at ISO's five poses; the instrument's noise is taken out. That they hold for {} "
+             "days is an assumption, until a check (<code>trammel check</code>) tells how fast this robot changes. A "
              "lasting error of up to {} mm an axis would not show, as nobody knows the instrument's sigma "
              "better than to 10 %.</p>\n",
              kFirstCheck, rounded_up_mm(accuracy->hidden()));

@@ -279,5 +279,20 @@ TEST_F(HealthTest, ACauseThatExplainsAsMuchWithMoreNumbersIsSaidToBePossible) {
   EXPECT_EQ(listed, 5);
 }
 
+TEST_F(HealthTest, PosesThatAreNotThisRobotsAreNeverCalledChance) {
+  const Cell& cell = robot_->model.cell();
+  hidden::Random random(7);
+  std::normal_distribution<double> normal;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    MeasurementBatch batch = test::measured_check(*robot_, {}, seed);
+    for (Measurement& m : batch.measurements) m.p_W += 0.04 * Vector3(normal(random), normal(random), normal(random));
+    const auto check = check_health(robot_->model, check_against_cell(batch, cell).value(), tolerance_mm(0.05));
+    if (!check) continue;  // taken for a mistake of reading
+    EXPECT_EQ(check->sentence.find("chance"), std::string::npos) << check->sentence;
+    EXPECT_EQ(check->verdict, HealthVerdict::kCannotTell) << check->sentence;
+    EXPECT_NE(check->sentence.find("was the file read as it was meant"), std::string::npos) << check->sentence;
+  }
+}
+
 }  // namespace
 }  // namespace trammel

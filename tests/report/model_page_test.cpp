@@ -355,5 +355,46 @@ TEST_F(ModelPage, SaysInWordsWhatCouldNotBeTold) {
   EXPECT_TRUE(has(model_page(CompensatedModel::make(parts).value(), std::nullopt), "Nothing: every combination"));
 }
 
+/// The page of a model that was trained on so many poses, none held out.
+std::string page_of_poses(int poses) {
+  const auto cell = cell_with("");
+  test::SmallBatch shape;
+  shape.poses = poses;
+  const MeasurementBatch batch = parse_batch_csv(test::small_batch_csv(*cell, shape), "few.csv").value();
+  TrainOptions options;
+  options.level = "M1";
+  options.bias = "none";
+  return model_page(train(cell, check_against_cell(batch, *cell, drawn(0, 1)).value(), options).value(), std::nullopt);
+}
+
+TEST_F(ModelPage, PromisesNothingWhereThePosesAreTooFewToTellHowGoodTheModelIs) {
+  for (const int poses : {1, 3}) {
+    const std::string page = page_of_poses(poses);
+    EXPECT_TRUE(has(page, "How good this model is cannot be said from so few poses")) << poses;
+    EXPECT_TRUE(has(page, "trammel plan chooses the poses")) << poses;
+    for (const char* part : {"Good to ", "class=\"tolerances", "class=\"iso", "The cell must hold"})
+      EXPECT_FALSE(has(page, part)) << poses << ": " << part;
+  }
+  EXPECT_TRUE(has(page_of_poses(30), "<p id=\"promise\">Good to "));
+}
+
+TEST_F(ModelPage, PromisesNothingByPosesThatAreNotThisRobots) {
+  MeasurementBatch exchanged = check_against_cell(batch_, *cell_)->rows();
+  for (Measurement& m : exchanged.measurements) std::swap(m.p_W.x(), m.p_W.y());
+  const std::string page = model_page(trained("none"), exchanged);
+  EXPECT_TRUE(has(page, "these poses do not fit the model")) << page.substr(page.find("id=\"promise"), 600);
+  EXPECT_TRUE(has(page, "exchanged"));
+  EXPECT_FALSE(has(page, "Good to "));
+  EXPECT_FALSE(has(page, "class=\"tolerances"));
+}
+
+TEST_F(ModelPage, ASingleBadPoseDoesNotMakeABatchThatOfAnotherRobot) {
+  const CompensatedModel model = trained("none");
+  MeasurementBatch own = check_against_cell(batch_, *cell_)->rows();
+  EXPECT_EQ(why_no_promise(model, PositionAccuracy::of(model, own), own), std::nullopt);
+  own.measurements.front().p_W.x() += 1;
+  EXPECT_EQ(why_no_promise(model, PositionAccuracy::of(model, own), own), std::nullopt);
+}
+
 }  // namespace
 }  // namespace trammel

@@ -1,6 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/files/batch_files.h"
@@ -8,6 +9,7 @@
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/evaluation_text.h"
+#include "server/base/plain_text.h"
 #include "server/base/units.h"
 #include "server/bias/kernels/kernel_spelling.h"
 #include "server/calibrate/jump.h"
@@ -16,6 +18,7 @@
 #include "server/compensate/world.h"
 #include "server/diagnose/triage.h"
 #include "server/error_sources/cause_words.h"
+#include "server/health/health_check.h"
 #include "server/measurement/gauges.h"
 #include "server/report/model_page.h"
 #include "server/report/pages_beside.h"
@@ -207,6 +210,13 @@ std::string learned_text(std::ptrdiff_t poses) {
       "note: the model was trained on {} of these poses: they say how well it fits, not how well it predicts\n", poses);
 }
 
+/// On standard error, where results for programs may not hide it: figures of poses that are not this robot's say
+/// nothing.
+void warn_of_foreign_poses(const CompensatedModel& model, const MeasurementBatch& batch) {
+  if (const auto foreign = foreign_poses(model, batch))
+    std::fputs(shown_lines(fmt::format("warning: {}\n", *foreign)).c_str(), stderr);
+}
+
 Status check_outputs(const EvaluateArguments& arguments) {
   if (arguments.residuals.empty()) return {};
   Outputs outputs;
@@ -247,6 +257,7 @@ Status evaluate(const EvaluateArguments& arguments) {
                                               : residuals_csv(positions, errors));
     if (!written) return written;
   }
+  warn_of_foreign_poses(*model, world->batch);
   nlohmann::ordered_json json = evaluation_json(evaluation);
   if (!structure.empty()) json["structure"] = structure;
   if (learned > 0) json["trained_on"] = learned;
@@ -274,6 +285,7 @@ Status report(const ReportArguments& arguments) {
       note = fmt::format("note: {} of the {} poses of {} do not judge the model, because it was trained on them\n",
                          learned, checked->size(), arguments.batch);
   }
+  if (batch) warn_of_foreign_poses(*model, *batch);
   if (const Status written =
           write_output(arguments.output, with_pages_beside(model_page(*model, batch), arguments.output));
       !written)

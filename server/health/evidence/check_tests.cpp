@@ -13,9 +13,10 @@ namespace {
 
 using Eigen::Index;
 
-constexpr int kSimulated = 3000;           // healthy checks
-constexpr double kLookCloser = 2e-4;       // p-value from which on bad poses are looked for
-constexpr double kBadPoseShare = 1 / 6.0;  // at most, at least one: more are no single bad poses
+constexpr int kSimulated = 3000;              // healthy checks
+constexpr double kLookCloser = 2e-4;          // p-value from which on bad poses are looked for
+constexpr std::size_t kMostHeld = 8'000'000;  // numbers of sets of bad poses that are kept: 64 MB
+constexpr double kBadPoseShare = 1 / 6.0;     // at most, at least one: more are no single bad poses
 
 double normal(SeededRandom& random) {
   const double radius = std::sqrt(-2 * std::log(random.uniform(1e-300, 1)));
@@ -63,7 +64,11 @@ std::vector<double> CheckTests::scores(const Eigen::VectorXd& left) const {
 
 HealthyChecks::HealthyChecks(const CheckRows& rows, Eigen::MatrixXd frames, const Questions& questions,
                              int tail_freedom, std::uint64_t seed)
-    : rows_(rows), frames_(std::move(frames)), questions_(questions), tail_freedom_(tail_freedom) {
+    : rows_(rows),
+      frames_(std::move(frames)),
+      questions_(questions),
+      tail_freedom_(tail_freedom),
+      beside_poses_(tests({}).directions(), questions.causes, tests({}).rows().freedom()) {
   const Eigen::MatrixXd root = rows.covariance.llt().matrixL();
   for (int k = 0; k < kSimulated; ++k)
     smallest_.push_back(sifted(simulated(root, seed + static_cast<std::uint64_t>(k))).smallest_p);
@@ -95,17 +100,44 @@ const CheckTests& HealthyChecks::tests(const std::vector<int>& bad) {
   return tests_.emplace(key, CheckTests(rows_.covariance, refitted, questions_)).first->second;
 }
 
+const HealthyChecks::Beside& HealthyChecks::beside(std::vector<int> bad) {
+  std::sort(bad.begin(), bad.end());
+  if (const auto known = beside_.find(bad); known != beside_.end()) return known->second;
+  passing_ = beside_poses_.beside(bad);
+  if (held_ + passing_->size() > kMostHeld) return *passing_;
+  held_ += passing_->size();
+  return beside_.emplace(std::move(bad), std::move(*passing_)).first->second;
+}
+
+double HealthyChecks::smallest_p(const Beside& beside, const Seen& left) const {
+  if (beside.whole_freedom() < 1) return 1;
+  double smallest = chi_square_tail(left.square, beside.whole_freedom());
+  for (std::size_t h = 0; h < questions_.causes; ++h) {
+    const int freedom = beside.freedom(h);
+    if (freedom > 0) smallest = std::min(smallest, chi_square_tail(beside.explained(h, left), freedom));
+  }
+  return smallest;
+}
+
+std::size_t HealthyChecks::most_explained(const Beside& beside, const Seen& left) const {
+  const double price = std::log(static_cast<double>(rows_.residual.size()));
+  std::vector<double> scores;
+  for (std::size_t h = 0; h < questions_.hypotheses.size(); ++h)
+    scores.push_back(beside.explained(h, left) - price * beside.freedom(h));
+  return static_cast<std::size_t>(std::max_element(scores.begin(), scores.end()) - scores.begin());
+}
+
 Sifted HealthyChecks::sifted(const Eigen::VectorXd& residual) {
   const auto most =
       std::max<std::size_t>(1, static_cast<std::size_t>(kBadPoseShare * static_cast<double>(rows_.poses())));
+  const Seen seen = beside_poses_.seen(tests({}).rows().left(residual));
   Sifted sifted;
   while (true) {
-    const CheckTests& now = tests(sifted.bad);
-    const Eigen::VectorXd left = now.rows().left(residual);
-    sifted.smallest_p = now.smallest_p(left);
+    const Beside& now = beside(sifted.bad);
+    const Seen left = now.left(seen);
+    sifted.smallest_p = smallest_p(now, left);
     if (sifted.smallest_p > kLookCloser || sifted.bad.size() == most) return sifted;
-    const std::vector<double> scores = now.scores(left);
-    const auto best = static_cast<std::size_t>(std::max_element(scores.begin(), scores.end()) - scores.begin());
+    const std::size_t best = most_explained(now, left);
     if (best < questions_.causes) return sifted;
     sifted.bad.push_back(questions_.hypotheses[best].pose);
   }

@@ -2,9 +2,11 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "server/health/evidence/refitted_rows.h"
+#include "server/health/evidence/tests_beside_poses.h"
 
 namespace trammel::health {
 
@@ -22,6 +24,8 @@ class CheckTests {
   [[nodiscard]] const RefittedRows& rows() const { return rows_; }
   /// Numbers that the test of a hypothesis looks at.
   [[nodiscard]] int freedom(std::size_t hypothesis) const { return static_cast<int>(directions_[hypothesis].cols()); }
+  /// R x k, orthonormal: what each hypothesis can explain.
+  [[nodiscard]] const std::vector<Eigen::MatrixXd>& directions() const { return directions_; }
   /// Chance of explaining as much of `left` (R, whitened, refitted) where nothing is.
   [[nodiscard]] double p_value(std::size_t hypothesis, const Eigen::VectorXd& left) const;
   /// Of everything together.
@@ -61,13 +65,23 @@ class HealthyChecks {
   [[nodiscard]] double chance_of(double p) const;
 
  private:
+  using Seen = TestsBesidePoses::Seen;
+  using Beside = TestsBesidePoses::Beside;
   [[nodiscard]] Eigen::VectorXd simulated(const Eigen::MatrixXd& root, std::uint64_t seed) const;
+  /// The tests beside these poses. Valid until the next call: sets are kept only while they take little room.
+  [[nodiscard]] const Beside& beside(std::vector<int> bad);
+  [[nodiscard]] double smallest_p(const Beside& beside, const Seen& left) const;
+  [[nodiscard]] std::size_t most_explained(const Beside& beside, const Seen& left) const;
 
   const CheckRows& rows_;
   const Eigen::MatrixXd frames_;
   const Questions& questions_;
   const int tail_freedom_;
   std::map<std::vector<int>, CheckTests> tests_;
+  const TestsBesidePoses beside_poses_;
+  std::map<std::vector<int>, Beside> beside_;
+  std::size_t held_ = 0;  // numbers in `beside_`
+  std::optional<Beside> passing_;
   std::vector<double> smallest_;  // p-values of simulated checks, rising
 };
 

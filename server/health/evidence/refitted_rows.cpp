@@ -9,8 +9,6 @@ namespace {
 
 using Eigen::Index;
 
-constexpr double kLeastLeft = 1e-3;  // share of a column: less is rounding, or made up for
-
 /// Orthonormal directions of columns whose lengths were `before`.
 Eigen::MatrixXd span_of(Eigen::MatrixXd columns, const Eigen::VectorXd& before) {
   for (Index k = 0; k < columns.cols(); ++k) columns.col(k) /= std::max(before(k), 1e-300);

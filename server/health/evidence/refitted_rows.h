@@ -8,6 +8,9 @@
 
 namespace trammel::health {
 
+/// Share of a column: less that is left of it is rounding, or made up for.
+inline constexpr double kLeastLeft = 1e-3;
+
 /// Something that may explain the residuals: columns of R rows.
 struct Hypothesis {
   std::size_t cause = 0;         ///< index in CauseEffects::causes()
