@@ -21,17 +21,26 @@ struct Entry {
   const char* name;
   std::vector<std::string> endings;
   Program (*read)(std::vector<SourceFile>, const ReadOptions&);
+  const char* motions;
 };
 
 const std::vector<Entry>& entries() {
   static const std::vector<Entry> kEntries = {
-      {Dialect::kRapid, "rapid", {".mod", ".prg", ".sys", ".modx", ".prgx", ".sysx"}, read_rapid},
-      {Dialect::kFanuc, "fanuc", {".ls"}, read_fanuc},
-      {Dialect::kKrl, "krl", {".src", ".dat", ".sub"}, read_krl},
-      {Dialect::kInform, "inform", {".jbi"}, read_inform},
-      {Dialect::kUrScript, "urscript", {".script"}, read_urscript},
-      {Dialect::kCamRob, "camrob", {}, read_camrob},
-      {Dialect::kRoboDk, "robodk", {}, read_robodk},
+      {Dialect::kRapid,
+       "rapid",
+       {".mod", ".prg", ".sys", ".modx", ".prgx", ".sysx"},
+       read_rapid,
+       "MoveJ, MoveL, MoveC or MoveAbsJ in a MODULE"},
+      {Dialect::kFanuc, "fanuc", {".ls"}, read_fanuc, "J, L or C to P[...] with its /POS section"},
+      {Dialect::kKrl, "krl", {".src", ".dat", ".sub"}, read_krl, "PTP, LIN or CIRC, in a DEF, with its .dat file"},
+      {Dialect::kInform, "inform", {".jbi"}, read_inform, "MOVJ, MOVL or MOVC to C00000 under NPOS"},
+      {Dialect::kUrScript, "urscript", {".script"}, read_urscript, "movej, movel, movep or movec"},
+      {Dialect::kCamRob, "camrob", {}, read_camrob, "rows of number;x;y;z;a;b;c, in mm and deg"},
+      {Dialect::kRoboDk,
+       "robodk",
+       {},
+       read_robodk,
+       "rows of name,x,y,z and rx,ry,rz (deg) or qw,qx,qy,qz, or a header that names them"},
   };
   return kEntries;
 }
@@ -62,6 +71,13 @@ std::optional<Dialect> dialect_of_file(const std::string& path) {
     if (std::find(entry.endings.begin(), entry.endings.end(), ending) != entry.endings.end()) return entry.dialect;
   }
   return std::nullopt;
+}
+
+const char* motions_of(Dialect dialect) {
+  for (const Entry& entry : entries()) {
+    if (entry.dialect == dialect) return entry.motions;
+  }
+  return "";
 }
 
 std::string dialect_names() {

@@ -160,6 +160,9 @@ struct Program {
   std::vector<ProgramMove> moves;
   std::vector<Reading> readings;
   std::vector<std::string> notes;  ///< what could not be compared, a sentence each
+
+  /// Whether any motion or target was seen in any of the files, be it one that is left as it is.
+  [[nodiscard]] bool is_understood() const { return !(moves.empty() && targets.empty() && left.empty()); }
 };
 
 struct ReadOptions {

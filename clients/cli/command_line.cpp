@@ -122,15 +122,16 @@ int run_command_line(int argc, const char* const* argv) {
     app.parse(std::vector<std::string>(all->rbegin(), all->rend()));  // the parser takes them from the end
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) return tell_help(app, error);
-    return tell_errors(usage_error(error, name), name, words);
+    return tell_errors(usage_error(app, error, name), name, words);
   }
   if (!chosen) {
     fmt::print(stderr, "A command is required\n{}", app.help());
     return kWrongUsage;
   }
   const CLI::App& command = *app.get_subcommands().front();
-  if (const Status spared = check_inputs_are_spared(command); !spared)
-    return tell_errors(advised(spared.error(), command), command.get_name(), words);
+  if (const auto empty = empty_word(command)) return tell_errors(*empty, command.get_name(), words);
+  if (const Status fine = check_outputs(command); !fine)
+    return tell_errors(advised(fine.error(), command), command.get_name(), words);
   const Result<Extent> done = chosen();
   if (done) return *done == Extent::kAll ? 0 : kNotAll;
   return tell_errors(advised(done.error(), command), command.get_name(), words);

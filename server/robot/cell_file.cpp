@@ -50,10 +50,15 @@ void read_link(const YamlMap& map, Joint& joint) {
 void read_motion(const YamlMap& map, Joint& joint) {
   const bool revolute = joint.type == JointType::kRevolute;
   const std::string limits = revolute ? "limits_deg" : "limits_mm";
+  const char* unit = revolute ? "deg" : "mm";
   const std::string speed = revolute ? "max_speed_deg_s" : "max_speed_mm_s";
   const auto si = [&](double value) { return revolute ? from_deg(value) : from_mm(value); };
   if (map.has(limits)) {
     const std::vector<double> range = map.numbers(limits, 2);
+    if (!(range[0] < range[1])) {
+      map.refuse(limits, refused("lower limit {:g} {} is not below upper limit {:g} {}", range[0], unit, range[1], unit)
+                             .beyond(range[0], range[1]));
+    }
     joint.lower = si(range[0]);
     joint.upper = si(range[1]);
   }

@@ -190,10 +190,46 @@ TEST_F(CorrectProgram, WhatIsPredictedOfAProgramIsWhereItsTargetsAre) {
   EXPECT_EQ(run("predict", {"--model", model(), before, "--covariance", "-o", file("q.csv")}), kWrongUsage);
 }
 
-TEST_F(CorrectProgram, WhereNoMotionIsUnderstoodTheExitCodeSaysSo) {
-  const std::string path = folder_.write("m.mod", "MODULE M\n  PROC main()\n    Home;\n  ENDPROC\nENDMODULE\n");
-  EXPECT_EQ(correct({"--model", model(), path, "-o", file("out.mod")}), kNotAll);
-  EXPECT_EQ(correct({"--model", model(), path, "-o", file("out.mod"), "--allow-failed"}), 0);
+TEST_F(CorrectProgram, WhereNoMotionIsUnderstoodNothingIsWritten) {
+  for (const char* text :
+       {"", "\x8f\x01\xe3\xff\x10\n\x99,\x02", "MODULE M\n  PROC main()\n    Home;\n  ENDPROC\nENDMODULE\n"}) {
+    for (const char* name : {"m.mod", "m.src", "m.ls", "m.jbi", "m.script"}) {
+      const std::string path = folder_.write(name, text);
+      EXPECT_EQ(correct({"--model", model(), path, "-o", file("out")}), kRefusedData) << name << ": " << text;
+      EXPECT_EQ(correct({"--model", model(), path, "-o", file("out"), "--allow-failed"}), kRefusedData) << name;
+      EXPECT_EQ(run("predict", {"--model", model(), path, "-o", file("out")}), kRefusedData) << name;
+      EXPECT_FALSE(exists("out"));
+    }
+  }
+}
+
+TEST_F(CorrectProgram, AFolderOfWhichSomeFilesHaveNoMotionIsCorrected) {
+  fs::create_directory(file("in"));
+  module("in/a.mod");
+  const std::string home = "MODULE H\n  PROC home()\n  ENDPROC\nENDMODULE\n";
+  folder_.write("in/h.mod", home);
+  EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out"), "--receipt", file("out/r.csv")}), 0)
+      << "the receipt may lie in the folder that is made";
+  EXPECT_EQ(text("out/h.mod"), home);
+  EXPECT_TRUE(exists("out/r.csv"));
+}
+
+TEST_F(CorrectProgram, AReceiptThatCannotBeWrittenLeavesNoCorrectedProgram) {
+  const std::string before = module("m.mod");
+  EXPECT_EQ(correct({"--model", model(), before, "-o", file("out.mod"), "--receipt", file("no/r.csv")}), kRefusedData);
+  EXPECT_EQ(correct({"--model", model(), before, "-o", file("out.mod"), "--report", file("no/r.html")}), kRefusedData);
+  EXPECT_EQ(correct({"--model", model(), before, "-o", file("out.mod"), "--receipt", file("out.mod")}), kWrongUsage);
+  EXPECT_EQ(correct({"--model", model(), before, "-o", file("out.mod"), "--receipt", file("out.mod.original")}),
+            kWrongUsage);
+  fs::create_directory(file("in"));
+  const std::string inside = module("in/a.mod");
+  const std::string was = read_text_file(inside).value();
+  EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out"), "--json", inside}), kWrongUsage);
+  EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out"), "--json", file("out/a.mod")}), kWrongUsage);
+  EXPECT_EQ(read_text_file(inside).value(), was);
+  EXPECT_FALSE(exists("out.mod"));
+  EXPECT_FALSE(exists("out"));
+  EXPECT_EQ(correct({"--model", model(), before, "-o", file("new/out.mod"), "--receipt", file("new/r.csv")}), 0);
 }
 
 TEST_F(CorrectProgram, MeasuringProgramsOfEveryControllerArePredictedAsTheyArePlanned) {

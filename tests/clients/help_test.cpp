@@ -94,6 +94,19 @@ TEST_F(Help, TopicsFitIn80ColumnsAndTheirCommandsExist) {
   }
 }
 
+TEST_F(Help, WhatIsPrintedFitsIn80Columns) {
+  const auto fits = [](const std::string& about) {
+    const char* words[] = {"trammel", "help", about.c_str()};
+    testing::internal::CaptureStdout();
+    EXPECT_EQ(run_command_line(about.empty() ? 2 : 3, words), 0) << about;
+    for (const std::string& line : lines_of(testing::internal::GetCapturedStdout()))
+      EXPECT_LE(line.size(), 80u) << about << ": " << line;
+  };
+  fits("");
+  for (const HelpTopic& topic : help_topics()) fits(std::string(topic.name));
+  for (const CLI::App* command : commands()) fits(command->get_name());
+}
+
 TEST_F(Help, ManualPagesAndCompletionsHaveEveryCommandAndOption) {
   const CommandText program = described(app_);
   const auto pages = manual_pages(program, "1.2.3", folder_.path());

@@ -32,6 +32,41 @@ TEST(ServiceText, JobsThatRunWaitAndFailedAreShownWithReasonAndDates) {
   EXPECT_TRUE(jobs_json({job(5, "queued", "")})[0]["started_unix_s"].is_null());
 }
 
+TEST(ServiceText, HowAJobEndedIsNotWhatIsInForceNow) {
+  client::JobStatus job = {1, "cell-7", "done", "in force: better", 1, 1, true};
+  job.verdict = "in_force";
+  EXPECT_EQ(ended_text(job), "job 1 of cell cell-7 done: version 1, in force\nin force: better\n");
+  job.in_force = false;
+  EXPECT_TRUE(put_in_force(job));
+  EXPECT_EQ(next_step(job), "");
+  EXPECT_EQ(ended_text(job),
+            "job 1 of cell cell-7 done: version 1, was put in force, and another version is in force now\n"
+            "when it ended: in force: better\n");
+  job.verdict = "not_better";
+  job.what = "not in force: worse";
+  EXPECT_FALSE(put_in_force(job));
+  EXPECT_EQ(ended_text(job), "job 1 of cell cell-7 done: version 1, not in force\nnot in force: worse\n");
+  job.in_force = true;
+  EXPECT_FALSE(put_in_force(job));
+  EXPECT_EQ(ended_text(job),
+            "job 1 of cell cell-7 done: version 1, was not put in force by the job, and is in force now\n"
+            "when it ended: not in force: worse\n");
+  job.verdict = "open";
+  EXPECT_TRUE(put_in_force(job)) << "a job from before verdicts were kept";
+}
+
+TEST(ServiceText, ServersThatSayDifferentThingsOfABatchAreNamed) {
+  client::BatchOfService one{"cell-7", "lt-07", "", 60, 0, "", true, "a"};
+  client::BatchOfService other = one;
+  EXPECT_EQ(batches_text({one, other}).find("server"), std::string::npos);
+  other.server = "b";
+  other.learned = false;
+  const std::string text = batches_text({one, other});
+  EXPECT_NE(text.find("\na               cell-7          lt-07"), std::string::npos) << text;
+  EXPECT_NE(text.find("\nb               cell-7          lt-07"), std::string::npos) << text;
+  EXPECT_EQ(batches_json({one, other})[1]["server"], "b");
+}
+
 TEST(ServiceText, AModelsDatesAreThoseOfItsTrainingAndOfItsData) {
   client::ModelInfo model;
   model.cell = "cell-7";

@@ -96,11 +96,31 @@ TEST(TargetFile, IsHeldAgainstTheRobot) {
     const Status checked = check_targets(parse_targets_csv(text, "t.csv").value(), chain);
     return refusal_of(checked);
   };
-  EXPECT_EQ(check(kPose + ",conf\n1,2,3,1,0,0,0,1\n", robot), Refusal::none());
+  EXPECT_EQ(check(kPose + ",conf\n1001,2,3,1,0,0,0,1\n", robot), Refusal::none());
   EXPECT_EQ(check("q1_deg,q2_deg\n1,2\n", robot), Refusal("t.csv").beyond(2, 6));
   const Chain one = Chain::make("turntable", {Joint{}}).value();
   EXPECT_EQ(check("q1_deg\n1\n", one), Refusal::none());
   EXPECT_EQ(check(kPose + ",conf\n1,2,3,1,0,0,0,1\n", one), Refusal("t.csv", 2, "conf").value(1));
+}
+
+TEST(TargetFile, PositionsThatAllLookLikeMetresAreRefused) {
+  const Chain robot = test::small_cell("c")->robot;
+  const auto check = [&](const std::string& rows, const Chain& chain) {
+    return check_targets(parse_targets_csv(kPose + ",conf\n" + rows, "t.csv").value(), chain);
+  };
+  const std::string metres = "1.5,0.2,1.1,1,0,0,0,1\n1.6,-2.2,1.1,1,0,0,0,1\n";
+  const Status refused = check(metres, robot);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refusal_of(refused), Refusal("t.csv", 2, "x_mm").beyond(1.5, 10));
+  EXPECT_NE(refused.error().message.find("look like metres"), std::string::npos) << refused.error().message;
+  EXPECT_TRUE(check(metres + "1500,200,1100,1,0,0,0,1\n", robot)) << "one is not";
+  EXPECT_TRUE(check("1500,200,1100,1,0,0,0,1\n", robot));
+  Joint x, y, z;
+  for (Joint* axis : {&x, &y, &z}) axis->type = JointType::kPrismatic;
+  const auto gantry = Chain::make("gantry", {x, y, z});
+  ASSERT_TRUE(gantry);
+  const Status known = check("1.5,0.2,1.1,1,0,0,0,1\n", *gantry);
+  EXPECT_TRUE(known || known.error().field == "conf") << "a gantry may work about its zero";
 }
 
 }  // namespace

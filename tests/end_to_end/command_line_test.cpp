@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -32,7 +33,7 @@ class CommandLine : public testing::Test {
  protected:
   static Finished trammel(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), TRAMMEL_BINARY_DIR "/clients/trammel");
-    return test::run(arguments);
+    return test::run(arguments, std::chrono::minutes(8));  // a diagnosis that is applied takes a minute of processor
   }
   /// Fails the test when the program does.
   static Finished must(const std::vector<std::string>& arguments) {
@@ -966,6 +967,35 @@ TEST_F(CommandLine, NoBytesOfAModelFileEndTheProgram) {
   const std::string yaml = folder_.write("deep.yaml", std::string(1'000'000, '['));
   expect_refused({"plan", "--cell", yaml, "--count", "10", "-o", file("out")}, {yaml, "limit"});
   expect_refused({"plan", "--cell", "/dev/zero", "--count", "10", "-o", file("out")}, {"/dev/zero", "limit"});
+}
+
+TEST_F(CommandLine, EvaluateAndReportWarnOfPosesThatDoNotFitTheModel) {
+  const std::string model = train(measure("first", 60, 1), "M2");
+  const std::string fresh = measure("fresh", 20, 2);
+  EXPECT_EQ(must({"evaluate", "--model", model, "--batch", fresh}).err.find("warning"), std::string::npos);
+  const CsvTable table = CsvTable::parse(test::read_file(fresh), fresh).value();
+  const std::size_t y = table.require("y_mm").value(), x = table.require("x_mm").value();
+  std::string text = fmt::format("{}\n", fmt::join(table.columns(), ","));
+  for (std::size_t row = 0; row < table.size(); ++row) {
+    for (std::size_t k = 0; k < table.columns().size(); ++k)
+      text += (k == 0 ? "" : ",") + std::string(table.field(row, k == x ? y : k == y ? x : k));
+    text += "\n";
+  }
+  const std::string exchanged = folder_.write("exchanged.csv", text);
+  for (const std::vector<std::string>& more :
+       {std::vector<std::string>{"evaluate", "--json", "-"}, {"report", "-o", file("page.html")}}) {
+    std::vector<std::string> words = more;
+    words.insert(words.begin() + 1, {"--model", model, "--batch", exchanged});
+    const Finished warned = must(words);
+    EXPECT_NE(warned.err.find("warning: these poses do not fit the model"), std::string::npos) << warned.err;
+  }
+  EXPECT_NE(test::read_file(file("page.html")).find("Nothing can be promised"), std::string::npos);
+}
+
+TEST_F(CommandLine, APlannedCheckSaysThatItCountsTheInstrumentsNoiseAlone) {
+  const Finished planned = must({"plan", "--cell", cell_, "--check", "12", "-o", file("check.csv")});
+  EXPECT_NE(planned.out.find("Counting the instrument's noise alone"), std::string::npos) << planned.out;
+  EXPECT_NE(planned.out.find("trammel check says how large"), std::string::npos) << planned.out;
 }
 
 }  // namespace

@@ -424,6 +424,79 @@ const std::vector<Mistake>& mistakes() {
        2,
        "",
        "--json"},
+      // Outputs.
+      {"a plan over the poses that it is made from",
+       {"plan", "--cell", "${CELL}", "--from", "plan.csv", "-o", "plan.csv"},
+       2,
+       "",
+       "--output",
+       0,
+       "another file"},
+      {"a plan and its program in one file",
+       {"plan", "--cell", "${CELL}", "--count", "5", "-o", "p", "--rapid", "./p"},
+       2,
+       "",
+       "--rapid",
+       0,
+       "another file"},
+      {"corrected targets and their receipt in one file",
+       {"correct", "--model", "${MODEL}", "${TARGETS}", "-o", "c", "--receipt", "c"},
+       2,
+       "",
+       "--receipt",
+       0,
+       "another file"},
+      {"a program into a folder that is not there",
+       {"plan", "--cell", "${CELL}", "--count", "5", "-o", "p", "--rapid", "no/such/p.mod"},
+       3,
+       "no/such/p.mod",
+       "",
+       0,
+       "mkdir"},
+      {"a receipt into a folder that is not there",
+       {"correct", "--model", "${MODEL}", "${TARGETS}", "-o", "c", "--receipt", "no/such/r.csv"},
+       3,
+       "no/such/r.csv",
+       "",
+       0,
+       "mkdir"},
+      // Programs.
+      {"an empty program",
+       {"correct", "--model", "${MODEL}", "empty.mod", "-o", "c"},
+       3,
+       "empty.mod",
+       "",
+       0,
+       "--format"},
+      {"a program of random bytes",
+       {"correct", "--model", "${MODEL}", "random.src", "-o", "c"},
+       3,
+       "random.src",
+       "",
+       0,
+       "--format"},
+      {"a prediction of no program",
+       {"predict", "--model", "${MODEL}", "empty.mod", "-o", "c"},
+       3,
+       "empty.mod",
+       "",
+       0,
+       "--format"},
+      // Found on a third walk.
+      {"a model for a batch",
+       {"train", "--cell", "${CELL}", "--batch", "cut.model", "-o", "m"},
+       3,
+       "cut.model",
+       "",
+       0,
+       "--model"},
+      {"a cell that is an empty word", {"plan", "--cell", "", "--count", "5", "-o", "p"}, 2, "", "--cell", 0, "script"},
+      {"limits the wrong way round",
+       {"simulate", "--robot", "turned.yaml", "--truth", "turned.yaml", "--plan", "plan.csv", "-o", "b"},
+       3,
+       "turned.yaml",
+       "*",
+       -1},
       // Services.
       {"no daemon", {"status", "--port", "17999", "--timeout", "0.3"}, 4, "", "*", 0, "trammel doctor"},
       {"a batch that is not there, for a daemon",
@@ -445,6 +518,10 @@ class Mistakes : public testing::Test {
     folder_.write("cell-7.yaml", with(test::read_file(test::shipped_cell_file()), "../models", kModels));
     std::filesystem::create_directory(folder_.file("folder"));
     folder_.write("empty.csv", "");
+    folder_.write("empty.mod", "");
+    folder_.write("random.src", "\x8f\x01\xe3\xff\x10\n\x99,\x02");
+    folder_.write("turned.yaml", with(test::read_file(TRAMMEL_SOURCE_DIR "/models/abb_irb6640-205-275.yaml"),
+                                      "[-170, 170]", "[170, -170]"));
     folder_.write("cut.model", "{\"format\": 3, \"content\": {\"cell");
     folder_.write("random.csv", "\x8f\x01\xe3\xff\x10\n\x99,\x02");
     folder_.write("batch.xlsx", std::string("PK\x03\x04\0\0\0", 7));
@@ -561,10 +638,48 @@ TEST_F(Mistakes, NearMissesNameWhatWasMeant) {
   EXPECT_NE(said({"pln"}).find("did you mean plan?"), std::string::npos);
   EXPECT_NE(said({"plan", "--cel", "x"}).find("did you mean --cell?"), std::string::npos);
   EXPECT_NE(said({"train", "--validation", "0.1"}).find("did you mean --validation-share?"), std::string::npos);
+  EXPECT_NE(said({"plan", "--cell", "cell-7.yaml", "--count", "5", "--criterion", "observabilty", "-o", "p"})
+                .find("did you mean observability?"),
+            std::string::npos);
   EXPECT_NE(said({"help", "formts"}).find("did you mean formats?"), std::string::npos);
   EXPECT_NE(
       said({"train", "--cell", "misspelled.yaml", "--batch", "batch.csv", "-o", "m"}).find("did you mean gravity?"),
       std::string::npos);
+}
+
+TEST_F(Mistakes, WordsSayWhatIsWrongInTheUnitsOfTheUser) {
+  const auto said = [&](std::vector<std::string> words) { return run({"", std::move(words), 2, "", "", 0, ""}).err; };
+  const auto has = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
+  const std::string count = said({"plan", "--cell", "cell-7.yaml", "--count", "abc", "-o", "p"});
+  EXPECT_TRUE(has(count, "--count: abc is no whole number")) << count;
+  const std::string large = said({"plan", "--cell", "cell-7.yaml", "--count", "9999999", "-o", "p"});
+  EXPECT_TRUE(has(large, "9999999 not in range 1 to 1000000")) << large;
+  const std::string model = said({"train", "--cell", "cell-7.yaml", "--batch", "cut.model", "-o", "m"});
+  EXPECT_TRUE(has(model, "this is a model file, not a batch")) << model;
+  const std::string limits =
+      said({"simulate", "--robot", "turned.yaml", "--truth", "turned.yaml", "--plan", "plan.csv", "-o", "b"});
+  EXPECT_TRUE(has(limits, "lower limit 170 deg is not below upper limit -170 deg")) << limits;
+  EXPECT_TRUE(has(limits, "row ")) << limits;
+  const std::string cell = said({"plan", "--cell", "", "--count", "5", "-o", "p"});
+  EXPECT_TRUE(has(cell, "--cell is empty")) << cell;
+}
+
+TEST_F(Mistakes, AnOutputThatIsRefusedLeavesEveryFileAsItWas) {
+  const std::string before = test::read_file(folder_.file("plan.csv"));
+  EXPECT_EQ(run({"", {"plan", "--cell", "cell-7.yaml", "--from", "plan.csv", "-o", "plan.csv"}, 2}).exit_code, 2);
+  EXPECT_EQ(test::read_file(folder_.file("plan.csv")), before);
+  EXPECT_EQ(
+      run({"", {"plan", "--cell", "cell-7.yaml", "--from", "plan.csv", "-o", "p", "--krl", "no/p.src"}, 3}).exit_code,
+      3);
+  EXPECT_FALSE(std::filesystem::exists(folder_.file("p")));
+}
+
+TEST_F(Mistakes, AnOptionalColumnThatIsNearlyAKnownOneIsTold) {
+  folder_.write("near.csv", with(kRows, "pose_id", "pose_ids"));
+  const std::string said = run({"", {"train", "--cell", "cell-7.yaml", "--batch", "near.csv", "-o", "m"}, 3}).err;
+  EXPECT_NE(said.find("near.csv: column pose_ids is not known and is left aside; pose_id was meant?"),
+            std::string::npos)
+      << said;
 }
 
 TEST_F(Mistakes, ACheckOfAServerFileFindsWhatAStartOrAFirstTrainingWouldRefuse) {

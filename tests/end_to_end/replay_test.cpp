@@ -101,6 +101,22 @@ TEST_F(ReplayTest, ANumberThatWasChangedAfterwardsIsNamedAndHalfALastLineIsLeftO
   EXPECT_EQ(told.at("different"), 1);
   EXPECT_NE(told.at("largest").at(0).at("what").get<std::string>().find("row 3 item 1"), std::string::npos)
       << told.dump();
+  ASSERT_EQ(told.at("half_lines").size(), 1u);
+  EXPECT_TRUE(told.at("half_lines").at(0).get<std::string>().ends_with("changed.jsonl row 4")) << told.dump();
+}
+
+TEST_F(ReplayTest, HalfALastLineAndAnEmptyFileAreSaid) {
+  const auto replayed = [&](const std::string& name, const std::string& text) {
+    return test::run(
+        {TRAMMEL_BINARY_DIR "/clients/trammel", "replay", "--model", model_file(1), folder_.write(name, text)}, kLimit);
+  };
+  const std::string text = test::read_file(only_record());
+  const auto half = replayed("half.jsonl", text + text.substr(0, 100));
+  EXPECT_EQ(half.exit_code, 0) << half.err;
+  EXPECT_NE(half.out.find("half.jsonl row 4: the last line is half and is left out"), std::string::npos) << half.out;
+  const auto empty = replayed("empty.jsonl", "");
+  EXPECT_EQ(empty.out, "no requests recorded there\n");
+  EXPECT_EQ(empty.exit_code, 0) << empty.err;
 }
 
 TEST_F(ReplayTest, AnotherDomainAnotherBranchAndAnErrorThatWasNotKnownAreDifferencesToo) {

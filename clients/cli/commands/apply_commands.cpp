@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <filesystem>
 #include <optional>
 #include <utility>
@@ -7,6 +8,7 @@
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/commands/correct_program.h"
 #include "clients/cli/commands/predict_program.h"
+#include "clients/cli/files/batch_files.h"
 #include "clients/cli/files/program_files.h"
 #include "clients/cli/files/target_file.h"
 #include "clients/cli/service/answers.h"
@@ -125,17 +127,15 @@ Status add_uncertainties(Predictions& predictions, const ApplyArguments& argumen
 }
 
 Status predict(const ApplyArguments& arguments) {
-  Result<JointList> list = read_joint_csv(arguments.input);
+  Result<JointList> list = read_joint_file(arguments.input);
   if (!list) return tl::make_unexpected(list.error());
   fill_in(*list, arguments);
   Result<Predictions> predictions =
       arguments.service.service ? predict_by_service(*list, arguments) : predict_here(*list, arguments);
   if (!predictions) return tl::make_unexpected(predictions.error());
   if (const Status added = add_uncertainties(*predictions, arguments); !added) return added;
-  if (const Status written = write_output(arguments.output, predictions_csv(*list, *predictions)); !written) {
-    return written;
-  }
-  return write_json(arguments.json, predictions_json(*list, *predictions));
+  return write_together({{"--output", arguments.output, predictions_csv(*list, *predictions)},
+                         {"--json", arguments.json, json_text(predictions_json(*list, *predictions))}});
 }
 
 Result<Corrections> correct_here(const TargetFile& file, const ApplyArguments& arguments) {
@@ -172,6 +172,9 @@ Result<Corrections> correct_by_service(const TargetFile& file, const ApplyArgume
   auto answer =
       (*session)->correct_targets(*context, targets, [&](double share) { progress.show("correcting", share); });
   if (!answer) return tl::make_unexpected(answer.error());
+  const bool all_unreachable = std::all_of(answer->items.begin(), answer->items.end(),
+                                           [](const auto& item) { return item.status == "unreachable"; });
+  if (all_unreachable && may_be_metres(file)) return tl::make_unexpected(looks_like_metres(file));
   return Corrections{answer->model.id, file.joint_types, std::move(answer->items)};
 }
 
@@ -248,21 +251,18 @@ Result<Extent> correct(CorrectArguments arguments) {
   if (arguments.strict && !left_alone.empty()) {
     return refused("nothing is written: {}", left_alone.substr(0, left_alone.size() - 1));
   }
-  if (const Status written = write_output(arguments.output, corrections_csv(*file, *corrections)); !written) {
-    return tl::make_unexpected(written.error());
-  }
-  if (!arguments.receipt.empty()) {
-    const Status written = write_output(arguments.receipt, corrections_csv(*file, *corrections));
-    if (!written) return tl::make_unexpected(written.error());
-  }
   const auto verdict = verdict_of(*corrections, arguments.tolerance_mm);
+  auto json = corrections_json(*file, *corrections);
+  if (verdict) json["tolerance"] = tolerance_json(*verdict);
+  const std::string table = corrections_csv(*file, *corrections);
+  if (const Status written = write_together({{"--output", arguments.output, table},
+                                             {"--receipt", arguments.receipt, table},
+                                             {"--json", arguments.json, json_text(json)}});
+      !written)
+    return tl::make_unexpected(written.error());
   fmt::print(
       stderr, "{}",
       shown_lines(corrections_summary(*corrections) + left_alone + (verdict ? verdict_text(*verdict) + "\n" : "")));
-  auto json = corrections_json(*file, *corrections);
-  if (verdict) json["tolerance"] = tolerance_json(*verdict);
-  const Status written = write_json(arguments.json, json);
-  if (!written) return tl::make_unexpected(written.error());
   return left_alone.empty() || arguments.allow_failed ? Extent::kAll : Extent::kPart;
 }
 

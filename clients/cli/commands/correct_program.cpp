@@ -1,8 +1,10 @@
 #include "clients/cli/commands/correct_program.h"
 
+#include <algorithm>
 #include <chrono>
 #include <ctime>
 #include <filesystem>
+#include <iterator>
 
 #include "clients/cam/correct_program.h"
 #include "clients/cam/mark.h"
@@ -99,22 +101,55 @@ Result<Corrected> correct_by_service(const cam::Program& program, const CorrectP
       });
 }
 
-/// Writes the files, and beside each that is changed what it was before.
-Status write_files(const ProgramFiles& before, const std::vector<cam::SourceFile>& after,
-                   const std::vector<bool>& keep_before, const std::vector<std::string>& paths) {
-  std::vector<TextFile> files;
+/// What is written: to each path its text. What stands for standard output is among them.
+using Texts = std::vector<TextFile>;
+
+/// The files, and beside each that is changed what it was before.
+Texts texts_of(const ProgramFiles& before, const std::vector<cam::SourceFile>& after,
+               const std::vector<bool>& keep_before, const std::vector<std::string>& paths) {
+  Texts texts;
   for (std::size_t k = 0; k < after.size(); ++k) {
-    if (paths[k] == "-") {
-      if (const Status written = write_output("-", after[k].text); !written) return written;
-      continue;
-    }
-    std::error_code error;
-    const fs::path folder = fs::path(paths[k]).parent_path();
-    if (!folder.empty()) fs::create_directories(folder, error);
-    files.push_back({paths[k], after[k].text});
-    if (keep_before[k]) files.push_back({cam::original_path(paths[k]), before.files[k].text});
+    texts.push_back({paths[k], after[k].text});
+    if (keep_before[k] && paths[k] != "-") texts.push_back({cam::original_path(paths[k]), before.files[k].text});
   }
-  return write_text_files(files);
+  return texts;
+}
+
+/// All or none; the folders of programs are made.
+Status write_texts(const Texts& texts, const std::vector<std::string>& programs) {
+  for (const std::string& path : programs) {
+    std::error_code error;
+    const fs::path folder = path == "-" ? fs::path() : fs::path(path).parent_path();
+    if (!folder.empty()) fs::create_directories(folder, error);
+  }
+  std::vector<TextFile> files;
+  std::copy_if(texts.begin(), texts.end(), std::back_inserter(files),
+               [](const TextFile& text) { return text.path != "-"; });
+  if (const Status written = write_text_files(files); !written) return written;
+  for (const TextFile& text : texts) {
+    if (text.path != "-") continue;
+    if (const Status written = write_output("-", text.text); !written) return written;
+  }
+  return {};
+}
+
+/// Refuses a receipt, a page or a result for programs where a file of the program is, or comes.
+Status check_receipts_are_apart(const ProgramFiles& program, const std::vector<std::string>& paths,
+                                const CorrectProgramArguments& arguments) {
+  Outputs receipts;
+  receipts.add("--report", arguments.report);
+  receipts.add("--receipt", arguments.receipt);
+  receipts.add("--json", arguments.json);
+  std::vector<NamedFile> taken;
+  for (const std::string& path : paths) {
+    if (path == "-") continue;
+    taken.push_back({"a file of --output", path});
+    taken.push_back({"what a file of --output was before", cam::original_path(path)});
+  }
+  for (const std::string& path : program.paths) {
+    if (path != "-") taken.push_back({"a file of the program", path});
+  }
+  return receipts.check_apart(taken);
 }
 
 Result<Extent> undo(const ProgramFiles& marked, const CorrectProgramArguments& arguments) {
@@ -123,25 +158,32 @@ Result<Extent> undo(const ProgramFiles& marked, const CorrectProgramArguments& a
   const auto paths = output_paths(marked, arguments.output);
   if (!paths) return tl::make_unexpected(paths.error());
   const std::vector<bool> none(before->files.size(), false);
-  if (const Status written = write_files(*before, before->files, none, *paths); !written)
+  if (const Status written = write_texts(texts_of(*before, before->files, none, *paths), *paths); !written)
     return tl::make_unexpected(written.error());
   return Extent::kAll;
 }
 
-Status write_receipts(const Corrected& done, const CorrectProgramArguments& arguments) {
+void add_receipts(const Corrected& done, const CorrectProgramArguments& arguments, Texts& texts) {
   const cam::CorrectedProgram& corrected = done.program;
   if (!arguments.report.empty()) {
     const std::string page = receipt_page(corrected, arguments.tolerance_mm, done.papers);
-    const Status written = write_output(arguments.report, with_pages_beside(page, arguments.report));
-    if (!written) return written;
+    texts.push_back({arguments.report, with_pages_beside(page, arguments.report)});
   }
-  if (!arguments.receipt.empty()) {
-    if (const Status written = write_output(arguments.receipt, receipt_csv(corrected)); !written) return written;
-  }
-  if (arguments.json.empty()) return {};
+  if (!arguments.receipt.empty()) texts.push_back({arguments.receipt, receipt_csv(corrected)});
+  if (arguments.json.empty()) return;
   std::optional<ToleranceVerdict> verdict;
   if (arguments.tolerance_mm > 0) verdict = tolerance_verdict(expected_errors(corrected), arguments.tolerance_mm);
-  return write_output(arguments.json, receipt_json(corrected, verdict));
+  texts.push_back({arguments.json, receipt_json(corrected, verdict)});
+}
+
+Result<cam::Program> read(const ProgramFiles& files, const CorrectProgramArguments& arguments) {
+  cam::ReadOptions reading{arguments.split, arguments.keep_joints, {}};
+  if (!arguments.frames.empty()) {
+    Result<std::map<std::string, Pose>> frames = read_frames_csv(arguments.frames);
+    if (!frames) return tl::make_unexpected(frames.error());
+    reading.frames = std::move(*frames);
+  }
+  return understood_program(files, reading);
 }
 
 }  // namespace
@@ -154,31 +196,24 @@ Result<Extent> correct_program(const CorrectProgramArguments& arguments) {
   if (!files) return tl::make_unexpected(files.error());
   const auto paths = output_paths(*files, arguments.output);
   if (!paths) return tl::make_unexpected(paths.error());
-  cam::ReadOptions reading{arguments.split, arguments.keep_joints, {}};
-  if (!arguments.frames.empty()) {
-    Result<std::map<std::string, Pose>> frames = read_frames_csv(arguments.frames);
-    if (!frames) return tl::make_unexpected(frames.error());
-    reading.frames = std::move(*frames);
-  }
-  const cam::Program program = cam::read_program(files->dialect, files->files, reading);
+  if (const Status apart = check_receipts_are_apart(*files, *paths, arguments); !apart)
+    return tl::make_unexpected(apart.error());
+  const Result<cam::Program> program = read(*files, arguments);
+  if (!program) return tl::make_unexpected(program.error());
   const Result<Corrected> done =
-      arguments.service.service ? correct_by_service(program, arguments) : correct_here(program, arguments);
+      arguments.service.service ? correct_by_service(*program, arguments) : correct_here(*program, arguments);
   if (!done) return tl::make_unexpected(done.error());
-  const cam::CorrectedProgram* const corrected = &done->program;
-  const std::string left = left_alone_text(*corrected);
+  const cam::CorrectedProgram& corrected = done->program;
+  const std::string left = left_alone_text(corrected);
   if (arguments.strict && !left.empty()) return refused("nothing is written: {}", left.substr(0, left.size() - 1));
-  if (const Status written = write_files(*files, corrected->files, corrected->changed, *paths); !written)
-    return tl::make_unexpected(written.error());
-  std::string told = receipt_summary(*corrected) + left;
+  Texts texts = texts_of(*files, corrected.files, corrected.changed, *paths);
+  add_receipts(*done, arguments, texts);
+  if (const Status written = write_texts(texts, *paths); !written) return tl::make_unexpected(written.error());
+  std::string told = receipt_summary(corrected) + left;
   if (arguments.tolerance_mm > 0)
-    told += verdict_text(tolerance_verdict(expected_errors(*corrected), arguments.tolerance_mm)) + "\n";
+    told += verdict_text(tolerance_verdict(expected_errors(corrected), arguments.tolerance_mm)) + "\n";
   fmt::print(stderr, "{}", shown_lines(told));
-  if (const Status written = write_receipts(*done, arguments); !written) return tl::make_unexpected(written.error());
-  const bool nothing = corrected->rows.empty();
-  if (nothing)
-    fmt::print(stderr, "note: no motion in it is understood as {}, so it is as it was; --format names another kind\n",
-               cam::name_of(files->dialect));
-  return (left.empty() && !nothing) || arguments.allow_failed ? Extent::kAll : Extent::kPart;
+  return left.empty() || arguments.allow_failed ? Extent::kAll : Extent::kPart;
 }
 
 }  // namespace trammel::cli

@@ -3,6 +3,7 @@
 #include <map>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/files/batch_files.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "server/base/units.h"
@@ -65,7 +66,7 @@ Result<Converted> read_converted(const ConvertArguments& arguments) {
                                  said(kBehind, arguments.behind), arguments.coverage};
   const Result<PointList> points = read_points(arguments.points, options);
   if (!points) return tl::make_unexpected(points.error());
-  const Result<JointList> joints = read_joint_csv(arguments.joints);
+  const Result<JointList> joints = read_joint_file(arguments.joints);
   if (!joints) return tl::make_unexpected(joints.error());
   return join_points(*points, *joints, arguments.in_order).map([&](MeasurementBatch batch) {
     const std::size_t not_measured = joints->poses.size() - batch.measurements.size();
@@ -162,7 +163,7 @@ Status localise_batch(const ReferencesArguments& arguments, const ReferenceCheck
         .beyond(to_mm(check.rms_remaining), arguments.repeat_above_mm)
         .with_text(check.worst);
   }
-  return read_batch(arguments.batch).and_then([&](MeasurementBatch batch) {
+  return read_batch_file(arguments.batch).and_then([&](MeasurementBatch batch) {
     if (Status positions = require_positions(batch, "references --batch"); !positions) return positions;
     const Pose X_WV = check.verdict == ReferenceVerdict::kFine ? Pose::Identity() : check.X_WV;
     return write_output(arguments.output, to_csv(localised(std::move(batch), X_WV)));

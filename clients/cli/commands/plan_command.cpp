@@ -4,9 +4,11 @@
 #include <limits>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/files/batch_files.h"
 #include "clients/cli/files/cell_to_train.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
+#include "server/base/near_miss.h"
 #include "server/base/units.h"
 #include "server/measurement/files/joint_list.h"
 #include "server/measurement/pose_columns.h"
@@ -32,6 +34,8 @@ struct PlanArguments {
   }
 };
 
+const std::vector<std::string> kCriteria = {"lhs", "observability", "separate"};
+
 /// `lhs`, `observability`, or `separate:CAUSE,CAUSE`; a cause may hold a colon of its own.
 Status read_criterion(const std::string& text, PlanOptions& options) {
   const std::string separate = "separate:";
@@ -42,7 +46,8 @@ Status read_criterion(const std::string& text, PlanOptions& options) {
   }
   const std::size_t comma = text.find(',');
   if (!text.starts_with(separate) || comma == std::string::npos) {
-    return failure(ErrorCode::kUsage, "--criterion '{}': expected lhs, observability or separate:CAUSE,CAUSE", text)
+    return failure(ErrorCode::kUsage, "--criterion '{}': expected lhs, observability or separate:CAUSE,CAUSE{}", text,
+                   did_you_mean(text.substr(0, text.find(':')), kCriteria))
         .of("--criterion")
         .with_text(text);
   }
@@ -70,21 +75,25 @@ ProgramOptions program_called_after(const std::string& path, ProgramOptions opti
   return options;
 }
 
-/// The texts by their output paths. Nothing is written until all are complete.
-Result<std::vector<std::pair<std::string, std::string>>> outputs_of(const Cell& cell, const PlanArguments& arguments,
-                                                                    const Plan& plan) {
-  std::vector<std::pair<std::string, std::string>> outputs = {{arguments.output, as_csv(cell, arguments.output, plan)}};
-  const auto add = [&](const std::string& path, const auto& writer) -> Status {
+/// The plan and its programs as text, by the options that name their files. All are written together, or none is.
+Result<Outputs> outputs_of(const Cell& cell, const PlanArguments& arguments, const Plan& plan) {
+  Outputs outputs;
+  outputs.add("--output", arguments.output);
+  outputs.put("--output", as_csv(cell, arguments.output, plan));
+  const auto add = [&](const char* option, const std::string& path, const auto& writer) -> Status {
     if (path.empty()) return {};
     Result<std::string> text = writer(cell.robot, plan, program_called_after(path, arguments.program));
     if (!text) return Failure(text.error()).as(ErrorCode::kRefused).in(path);
-    outputs.emplace_back(path, std::move(*text));
+    outputs.add(option, path);
+    outputs.put(option, std::move(*text));
     return {};
   };
-  if (const Status rapid = add(arguments.rapid, to_rapid); !rapid) return tl::make_unexpected(rapid.error());
-  if (const Status krl = add(arguments.krl, to_krl); !krl) return tl::make_unexpected(krl.error());
-  if (const Status fanuc = add(arguments.fanuc, to_fanuc); !fanuc) return tl::make_unexpected(fanuc.error());
-  if (const Status script = add(arguments.urscript, to_urscript); !script) return tl::make_unexpected(script.error());
+  for (const Status& added :
+       {add("--rapid", arguments.rapid, to_rapid), add("--krl", arguments.krl, to_krl),
+        add("--fanuc", arguments.fanuc, to_fanuc), add("--urscript", arguments.urscript, to_urscript)}) {
+    if (!added) return tl::make_unexpected(added.error());
+  }
+  outputs.add("--json", arguments.json);
   return outputs;
 }
 
@@ -120,8 +129,11 @@ std::string check_text(const Plan& plan) {
   const SmallestEffect* hardest = hardest_seen(plan);
   if (hardest == nullptr) return "";
   if (!hardest->rms) return fmt::format("No change of {} would be seen\n", in_words(hardest->cause));
-  return fmt::format("Every single change of {:.3f} mm rms is seen with 95 %, hardest {}, beside the tracker's noise\n",
-                     to_mm(*hardest->rms), in_words(hardest->cause));
+  return fmt::format(
+      "Counting the instrument's noise alone, every single change of {:.3f} mm rms is seen with 95 %, hardest {}; what "
+      "a "
+      "model leaves over makes that larger: trammel check says how large\n",
+      to_mm(*hardest->rms), in_words(hardest->cause));
 }
 
 std::string in_words(const Cell& cell, const PlanArguments& arguments, const Plan& plan) {
@@ -180,7 +192,7 @@ ordered_json as_json(const Cell& cell, const PlanArguments& arguments, const Pla
 
 /// A plan of given poses, for example those of `diagnose --next-poses`.
 Result<Plan> plan_from(const Cell& cell, const std::string& path) {
-  return read_joint_csv(path)
+  return read_joint_file(path)
       .and_then([&](JointList list) { return check_against_cell(std::move(list), cell); })
       .and_then([&](const JointList& list) { return plan_of(cell, list); });
 }
@@ -204,14 +216,13 @@ Status plan(PlanArguments arguments) {
   // A batch is measured in the order of the program, so the plan has it, too.
   if (arguments.writes_program() && !arguments.keep_order)
     planned = ordered_for_travel(cell->robot, std::move(*planned));
-  const auto outputs = outputs_of(*cell, arguments, *planned);
+  Result<Outputs> outputs = outputs_of(*cell, arguments, *planned);
   if (!outputs) return tl::make_unexpected(outputs.error());
-  for (const auto& [path, text] : *outputs) {
-    if (const Status written = write_output(path, text); !written) return written;
-  }
+  outputs->put("--json", json_text(as_json(*cell, arguments, *planned)));
+  if (const Status written = outputs->write(); !written) return written;
   tell(in_words(*cell, arguments, *planned),
        {arguments.output, arguments.rapid, arguments.krl, arguments.fanuc, arguments.urscript, arguments.json});
-  return write_json(arguments.json, as_json(*cell, arguments, *planned));
+  return {};
 }
 
 void add_program_options(CLI::App& command, PlanArguments& arguments) {

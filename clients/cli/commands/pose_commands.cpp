@@ -2,6 +2,7 @@
 #include <filesystem>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/files/batch_files.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "server/base/units.h"
@@ -38,7 +39,7 @@ Status simulate_batch(const SimulateArguments& arguments) {
   const auto cell = std::make_shared<const Cell>(std::move(*read));
   const Result<VirtualRobot> robot = read_virtual_robot(arguments.truth, cell);
   if (!robot) return tl::make_unexpected(robot.error());
-  Result<JointList> list = read_joint_csv(arguments.plan);
+  Result<JointList> list = read_joint_file(arguments.plan);
   if (!list) return tl::make_unexpected(list.error());
   std::vector<PoseContext> poses;
   for (const CommandedPose& pose : list->poses) poses.push_back(pose.context);

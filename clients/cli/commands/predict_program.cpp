@@ -96,9 +96,10 @@ Result<Extent> predict_program(const PredictProgramArguments& arguments) {
     if (!frames) return tl::make_unexpected(frames.error());
     reading.frames = std::move(*frames);
   }
-  const cam::Program program = cam::read_program(files->dialect, files->files, reading);
+  const Result<cam::Program> program = understood_program(*files, reading);
+  if (!program) return tl::make_unexpected(program.error());
   const Result<cam::PredictedProgram> predicted =
-      arguments.service.service ? predict_by_service(program, arguments) : predict_here(program, arguments);
+      arguments.service.service ? predict_by_service(*program, arguments) : predict_here(*program, arguments);
   if (!predicted) return tl::make_unexpected(predicted.error());
   if (const Status written = write_output(arguments.output, prediction_csv(*predicted)); !written)
     return tl::make_unexpected(written.error());

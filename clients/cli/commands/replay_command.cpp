@@ -45,6 +45,7 @@ struct Replayed {
   std::size_t of_other_models = 0;    ///< requests that another model answered then
   std::set<std::string> other_cells;  ///< that the records have beside the model's
   std::vector<DamagedLines> damaged;  ///< by what was given to read
+  std::vector<std::string> half;      ///< last lines that were not written to their ends
 };
 
 double distance(const client::PoseMm& a, const client::PoseMm& b) {
@@ -192,11 +193,12 @@ Status compare(const RecordedCall& call, const Ask& ask, double tolerance_mm, Re
 }
 
 std::string replayed_text(const Replayed& all, double tolerance_mm) {
-  std::string text = fmt::format(
-      "{} requests, {} items: {} differ by more than {:g} mm, the largest by {:.3g} mm\nanswered then by {}, now by "
-      "{}\n",
-      all.requests, all.items, all.different, tolerance_mm, all.largest_mm, fmt::join(all.models, ", "),
-      fmt::join(all.models_now, ", "));
+  std::string text = fmt::format("{} requests, {} items: {} differ by more than {:g} mm, the largest by {:.3g} mm\n",
+                                 all.requests, all.items, all.different, tolerance_mm, all.largest_mm);
+  if (all.requests == 0) text = "no requests recorded there\n";
+  if (all.requests > 0)
+    text +=
+        fmt::format("answered then by {}, now by {}\n", fmt::join(all.models, ", "), fmt::join(all.models_now, ", "));
   if (all.of_other_models > 0)
     text += fmt::format("{} of the requests were answered by another model than now\n", all.of_other_models);
   if (!all.other_cells.empty())
@@ -205,6 +207,7 @@ std::string replayed_text(const Replayed& all, double tolerance_mm) {
   for (const DamagedLines& damaged : all.damaged)
     text += fmt::format("{} damaged {} left out, the first: {}\n", damaged.count,
                         damaged.count == 1 ? "line was" : "lines were", sentence(damaged.first));
+  for (const std::string& half : all.half) text += fmt::format("{}: the last line is half and is left out\n", half);
   return text;
 }
 
@@ -227,6 +230,7 @@ ordered_json replayed_json(const Replayed& all, double tolerance_mm) {
           {"answered_by_another_model", all.of_other_models},
           {"other_cells", all.other_cells},
           {"damaged_lines", damaged_lines(all)},
+          {"half_lines", all.half},
           {"first_damaged",
            all.damaged.empty() ? ordered_json(nullptr) : ordered_json(sentence(all.damaged.front().first))},
           {"largest", told}};
@@ -275,6 +279,7 @@ Result<Extent> replay(const ReplayArguments& arguments) {
     });
     if (!read) return tl::make_unexpected(read.error());
     if (read->count > 0) all.damaged.push_back(*read);
+    all.half.insert(all.half.end(), read->half.begin(), read->half.end());
   }
   if (all.requests == 0 && !all.other_cells.empty())
     return refused("no request of cell {}, only of {}", cell, fmt::join(all.other_cells, ", ")).of("cell");

@@ -5,6 +5,7 @@
 #include <type_traits>
 
 #include "clients/cli/commands/commands.h"
+#include "clients/cli/files/near_columns.h"
 #include "clients/cli/service/health_answers.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
@@ -12,6 +13,7 @@
 #include "clients/cli/text/service_text.h"
 #include "server/base/text_file.h"
 #include "server/compensate/model_file.h"
+#include "server/measurement/files/batch_file.h"
 #include "server/report/cell_health.h"
 
 namespace trammel::cli {
@@ -30,9 +32,9 @@ struct ServiceArguments {
   ServiceOptions service;
 };
 
-/// A job is complete if it made no model, or if its model is in force.
+/// A job is complete if it made no model, or if it put its model in force.
 Extent extent_of(const client::JobStatus& job) {
-  return job.model_version == 0 || job.in_force ? Extent::kAll : Extent::kPart;
+  return job.model_version == 0 || put_in_force(job) ? Extent::kAll : Extent::kPart;
 }
 
 /// Follows a job to its end; a failed one is an error.
@@ -56,12 +58,7 @@ Result<Extent> follow(client::Session& session, std::int64_t job, const ServiceA
         .with_value(end->job)
         .next(next);
   }
-  std::string text = fmt::format("job {} of cell {} {}", end->job, end->cell, end->stage);
-  if (end->model_version > 0) {
-    text += fmt::format(": version {}, {}", end->model_version, end->in_force ? "in force" : "not in force");
-  }
-  text += "\n" + (end->what.empty() ? "" : end->what + "\n") + (next.empty() ? "" : next + "\n");
-  tell(text, {arguments.json});
+  tell(ended_text(*end) + (next.empty() ? "" : next + "\n"), {arguments.json});
   return extent_of(*end);
 }
 
@@ -77,6 +74,7 @@ Result<Extent> submit(client::Session& session, const ServiceArguments& argument
   if (!cell) return tl::make_unexpected(cell.error());
   const Result<std::string> csv = read_text_file(arguments.batch);
   if (!csv) return tl::make_unexpected(csv.error());
+  if (recognise_batch(*csv) == BatchKind::kTrammel) tell_near_columns(*csv, TableKind::kBatch, arguments.batch);
   const std::string id =
       arguments.batch_id.empty() ? std::filesystem::path(arguments.batch).stem().string() : arguments.batch_id;
   const Result<std::int64_t> job = session.submit_measurements(*cell, id, *csv);

@@ -4,8 +4,14 @@
 #include <vector>
 
 #include "server/measurement/checked_batch.h"
+#include "server/measurement/files/joint_list.h"
 
 namespace trammel::cli {
+
+/// read_batch() and read_joint_csv(), where a column that is nearly a known one is told on standard error. Refuses a
+/// model file as such.
+[[nodiscard]] Result<MeasurementBatch> read_batch_file(const std::string& path);
+[[nodiscard]] Result<JointList> read_joint_file(const std::string& path);
 
 /// The batches of a cell, joined: each is a session of its own, or as many as its column says.
 [[nodiscard]] Result<CheckedBatch> read_checked_batches(const std::vector<std::string>& paths, const Cell& cell,

@@ -46,7 +46,8 @@ Result<std::string> standard_input() {
 
 bool same_file(const std::string& a, const std::string& b) {
   std::error_code error;
-  return fs::equivalent(a, b, error) || fs::weakly_canonical(a, error) == fs::weakly_canonical(b, error);
+  const auto place = [&](const std::string& path) { return fs::weakly_canonical(fs::absolute(path, error), error); };
+  return fs::equivalent(a, b, error) || place(a) == place(b);
 }
 
 }  // namespace
@@ -100,6 +101,18 @@ Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, 
   }
   program.dialect = dialect.value_or(cam::Dialect::kRapid);
   return program;
+}
+
+Result<cam::Program> understood_program(const ProgramFiles& files, const cam::ReadOptions& options) {
+  cam::Program program = cam::read_program(files.dialect, files.files, options);
+  if (program.is_understood()) return program;
+  const bool is_empty = std::all_of(files.files.begin(), files.files.end(),
+                                    [](const cam::SourceFile& file) { return file.text.empty(); });
+  const std::string where = files.paths.front() == "-" ? "standard input" : files.paths.front();
+  return refused("{}no motion of a {} program in it, expected {}", is_empty ? "it is empty: " : "",
+                 cam::name_of(files.dialect), cam::motions_of(files.dialect))
+      .in(where)
+      .next(fmt::format("see that it is the whole program; --format names another kind: {}", cam::dialect_names()));
 }
 
 Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all) {

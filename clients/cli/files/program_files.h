@@ -26,6 +26,9 @@ struct ProgramFiles {
 [[nodiscard]] Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs,
                                                       const std::string& format);
 
+/// What cam::read_program() makes of the files. Refuses a program without a single motion or target in any of them.
+[[nodiscard]] Result<cam::Program> understood_program(const ProgramFiles& files, const cam::ReadOptions& options);
+
 /// Of a program that is marked as corrected: each file as it was before. Refuses a file whose original is not kept
 /// beside it, or is not the one that the mark names. `all`: also where no file is marked, as for a new correction.
 [[nodiscard]] Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all);

@@ -100,7 +100,10 @@ Status read_file(const std::string& path, const std::function<Status(const Recor
   for (long line = 1; std::getline(file, text); ++line) {
     const bool is_cut_off = file.eof();  // no end of line: it is being written, or the server was killed
     const json record = json::parse(text, nullptr, false);
-    if (record.is_discarded() && is_cut_off) return {};
+    if (record.is_discarded() && is_cut_off) {
+      if (!text.empty()) read.damaged.half.push_back(fmt::format("{} row {}", path, line));
+      return {};
+    }
     auto call = parse_record(record);
     if (!call) {
       if (read.damaged.count++ == 0) read.damaged.first = Failure(call.error()).in(path).at_row(line).value();

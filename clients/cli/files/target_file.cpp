@@ -1,5 +1,9 @@
 #include "clients/cli/files/target_file.h"
 
+#include <algorithm>
+#include <cmath>
+
+#include "clients/cli/files/near_columns.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/measurement/files/csv_table.h"
@@ -13,6 +17,20 @@ namespace {
 
 constexpr double kPositionLimitMm = 1e6;
 constexpr int kHighestConf = 7;
+constexpr double kLargestMetres = 10;          // no arm reaches as many metres, and none its own foot in mm
+constexpr double kNearestShareOfReach = 0.01;  // of the targets in the middle
+
+/// m, of all its links; a gantry has none that says how far it goes.
+double arm_length(const Chain& robot) {
+  double length = 0;
+  int rails = 0;
+  for (int j = 0; j < robot.size(); ++j) {
+    const LinkGeometry& link = robot.joint(j).link;
+    length += std::hypot(link.a, link.d);
+    if (robot.joint(j).type == JointType::kPrismatic) ++rails;
+  }
+  return rails > 1 ? 0 : length;
+}
 
 struct TargetColumns {
   PoseColumns commanded;
@@ -113,7 +131,39 @@ Result<TargetFile> parse_targets_csv(const std::string& text, const std::string&
 }
 
 Result<TargetFile> read_targets_csv(const std::string& path) {
-  return read_text_file(path).and_then([&](const std::string& text) { return parse_targets_csv(text, path); });
+  return read_text_file(path).and_then([&](const std::string& text) {
+    Result<TargetFile> file = parse_targets_csv(text, path);
+    if (file) tell_near_columns(text, TableKind::kTargets, path);
+    return file;
+  });
+}
+
+bool may_be_metres(const TargetFile& file) {
+  return !file.rows.empty() && std::all_of(file.rows.begin(), file.rows.end(), [](const TargetRow& row) {
+    const Target& target = row.target;
+    return !target.joint_target && to_mm(target.X_BT.translation().lpNorm<Eigen::Infinity>()) < kLargestMetres;
+  });
+}
+
+Error looks_like_metres(const TargetFile& file) {
+  const Vector3 p = file.rows.front().target.X_BT.translation();
+  return refused("the positions look like metres: x_mm, y_mm and z_mm are mm, and all are below {:g}", kLargestMetres)
+      .in(file.where)
+      .at_row(file.rows.front().row)
+      .of("x_mm")
+      .beyond(to_mm(p.x()), kLargestMetres)
+      .next("write them in mm, 1000 times as large")
+      .value();
+}
+
+Status check_millimetres(const TargetFile& file, const Chain& robot) {
+  if (!may_be_metres(file)) return {};
+  std::vector<double> distances;
+  for (const TargetRow& row : file.rows) distances.push_back(row.target.X_BT.translation().norm());
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  if (*middle >= kNearestShareOfReach * arm_length(robot)) return {};
+  return tl::make_unexpected(looks_like_metres(file));
 }
 
 Status check_targets(const TargetFile& file, const Chain& robot) {
@@ -128,6 +178,7 @@ Status check_targets(const TargetFile& file, const Chain& robot) {
         .of(fmt::format("dir{}", directions))
         .beyond(directions, robot.size());
   }
+  if (const Status metres = check_millimetres(file, robot); !metres) return metres;
   if (has_spherical_wrist(robot)) return {};
   for (const TargetRow& row : file.rows) {
     if (!row.target.conf) continue;

@@ -28,8 +28,13 @@ struct TargetFile {
 [[nodiscard]] Result<TargetFile> parse_targets_csv(const std::string& text, const std::string& where);
 [[nodiscard]] Result<TargetFile> read_targets_csv(const std::string& path);
 
-/// Refuses joint and direction columns that are not the robot's, and conf where the robot's branches have no closed
-/// form.
+/// Whether every position is so near to the base that its numbers may be metres.
+[[nodiscard]] bool may_be_metres(const TargetFile& file);
+/// The refusal of such a file.
+[[nodiscard]] Error looks_like_metres(const TargetFile& file);
+
+/// Refuses joint and direction columns that are not the robot's, conf where the robot's branches have no closed form,
+/// and positions that all may be metres where the one in the middle is within a hundredth of the arm's length.
 [[nodiscard]] Status check_targets(const TargetFile& file, const Chain& robot);
 
 }  // namespace trammel::cli

@@ -25,7 +25,9 @@ bool same_file(const std::string& a, const std::string& b) {
   if (is_standard_output(a) || is_standard_output(b)) return is_standard_output(a) && is_standard_output(b);
   std::error_code error;
   if (fs::is_character_file(a, error)) return false;
-  return fs::equivalent(a, b, error) || fs::weakly_canonical(a, error) == fs::weakly_canonical(b, error);
+  // Of what is not there yet `p` and `./p` are the same as absolute paths only.
+  const auto place = [&](const std::string& path) { return fs::weakly_canonical(fs::absolute(path, error), error); };
+  return fs::equivalent(a, b, error) || place(a) == place(b);
 }
 
 /// Whether this process has written a result to standard output. A second one after it would not be valid JSON.
@@ -87,7 +89,7 @@ void Outputs::add(const std::string& option, const std::string& path, const std:
   if (!path.empty()) outputs_.push_back({{option, path}, may_replace, {}});
 }
 
-Status Outputs::check(const std::vector<NamedFile>& inputs) const {
+Status Outputs::check_apart(const std::vector<NamedFile>& inputs) const {
   for (std::size_t k = 0; k < outputs_.size(); ++k) {
     const auto& [option, path] = outputs_[k].file;
     for (std::size_t i = 0; i < k; ++i) {
@@ -95,16 +97,25 @@ Status Outputs::check(const std::vector<NamedFile>& inputs) const {
       return failure(ErrorCode::kUsage, "{} and {} both go to {}", outputs_[i].file.option, option,
                      is_standard_output(path) ? "standard output" : path)
           .of(option)
-          .with_text(path);
+          .with_text(path)
+          .next("name another file for one of them");
     }
     for (const NamedFile& input : inputs) {
       if (input.path.empty() || input.option == outputs_[k].may_replace || !same_file(path, input.path)) continue;
       return failure(ErrorCode::kUsage, "{} {} would overwrite {}", option, path, input.option)
           .of(option)
-          .with_text(path);
+          .with_text(path)
+          .next("name another file");
     }
-    if (is_standard_output(path)) continue;
-    if (const Status writable = check_writable(path); !writable) return writable;
+  }
+  return {};
+}
+
+Status Outputs::check(const std::vector<NamedFile>& inputs) const {
+  if (const Status apart = check_apart(inputs); !apart) return apart;
+  for (const Output& output : outputs_) {
+    if (is_standard_output(output.file.path)) continue;
+    if (const Status writable = check_writable(output.file.path); !writable) return writable;
   }
   return {};
 }
@@ -125,6 +136,15 @@ Status Outputs::write() const {
     if (output.text && output.file.path == "-") return write_output("-", *output.text);
   }
   return {};
+}
+
+Status write_together(const std::vector<OutputText>& texts) {
+  Outputs outputs;
+  for (const OutputText& one : texts) {
+    outputs.add(one.option, one.path);
+    outputs.put(one.option, one.text);
+  }
+  return outputs.write();
 }
 
 std::string emphasised(const std::string& text) {

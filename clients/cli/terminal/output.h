@@ -39,8 +39,9 @@ class Outputs {
  public:
   /// An empty path is no output. `may_replace`: the input that it may be the new state of.
   void add(const std::string& option, const std::string& path, const std::string& may_replace = "");
-  /// Refuses as wrong usage two outputs in one file or on standard output, and an output that is also an input. Refuses
-  /// as kRefused an output that cannot be written.
+  /// Refuses as wrong usage two outputs in one file or on standard output, and an output that is also an input.
+  [[nodiscard]] Status check_apart(const std::vector<NamedFile>& inputs) const;
+  /// Likewise, and as kRefused an output that cannot be written.
   [[nodiscard]] Status check(const std::vector<NamedFile>& inputs) const;
   /// The text of an output that was added; one that gets none is not written.
   void put(const std::string& option, std::string text);
@@ -54,6 +55,13 @@ class Outputs {
   };
   std::vector<Output> outputs_;
 };
+
+/// A text for the file that an option names; an empty path is no output.
+struct OutputText {
+  std::string option, path, text;
+};
+/// Writes all of them, or none.
+[[nodiscard]] Status write_together(const std::vector<OutputText>& texts);
 
 /// The text in bold red where standard error is a terminal that shows colours and NO_COLOR is not set; else as it is.
 [[nodiscard]] std::string emphasised(const std::string& text);

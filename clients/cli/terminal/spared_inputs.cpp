@@ -7,66 +7,140 @@
 #include <string_view>
 #include <vector>
 
+#include "clients/cli/files/program_files.h"
+#include "clients/cli/terminal/output.h"
+#include "server/base/text_file.h"
 #include "server/robot/cell_file.h"
 
 namespace trammel::cli {
 
 namespace {
 
-constexpr std::array<std::string_view, 6> kOutputs = {"--output",  "--json",      "--report",
-                                                      "--receipt", "--residuals", "--next-poses"};
-/// What a command may write over by design, or judges by itself.
-constexpr std::array<std::string_view, 3> kJudgedElsewhere = {"--from", "--cell-out", "--store"};
+namespace fs = std::filesystem;
 
-struct Given {
-  std::string option, path;
-};
+/// In the order in which two that are the same are named.
+constexpr std::array<std::string_view, 11> kOutputs = {"--output",     "--report", "--receipt", "--residuals",
+                                                       "--next-poses", "--rapid",  "--krl",     "--fanuc",
+                                                       "--urscript",   "--frames", "--json"};
+/// What a command may write over by design, or judges by itself.
+constexpr std::array<std::string_view, 2> kJudgedElsewhere = {"--cell-out", "--store"};
 
 template <typename Names>
 bool is_one_of(const Names& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-/// The files that exist among what the options were given.
-std::vector<Given> files_given(const CLI::App& command, bool outputs) {
-  std::vector<Given> files;
+/// `import-backup` writes the frames that `correct` and `predict` read.
+bool is_output(const CLI::App& command, const std::string& option) {
+  return is_one_of(kOutputs, option) && (option != "--frames" || command.get_name() == "import-backup");
+}
+
+bool is_input(const CLI::App& command, const std::string& option) {
+  return !is_output(command, option) && !is_one_of(kJudgedElsewhere, option);
+}
+
+std::vector<NamedFile> outputs_of(const CLI::App& command) {
+  std::vector<NamedFile> outputs;
+  for (const std::string_view word : kOutputs) {
+    const std::string name(word);
+    const CLI::Option* option = command.get_option_no_throw(name);
+    if (option == nullptr || !is_output(command, name)) continue;
+    for (const std::string& path : option->results()) outputs.push_back({name, path});
+  }
+  return outputs;
+}
+
+/// The files that exist among what the other options were given.
+std::vector<NamedFile> inputs_of(const CLI::App& command) {
+  std::vector<NamedFile> files;
   for (const CLI::Option* option : command.get_options()) {
     const std::string name = option->get_name();
-    if (is_one_of(kOutputs, name) != outputs || is_one_of(kJudgedElsewhere, name)) continue;
+    if (!is_input(command, name)) continue;
     for (const std::string& path : option->results()) {
       std::error_code error;
-      if (std::filesystem::is_regular_file(path, error)) files.push_back({name, path});
+      if (fs::is_regular_file(path, error)) files.push_back({name, path});
     }
   }
   return files;
 }
 
 /// The robot files that cell files name.
-std::vector<Given> robots_of(const std::vector<Given>& inputs) {
-  std::vector<Given> robots;
-  for (const Given& input : inputs) {
+std::vector<NamedFile> robots_of(const std::vector<NamedFile>& inputs) {
+  std::vector<NamedFile> robots;
+  for (const NamedFile& input : inputs) {
     if (input.option != "--cell") continue;
     if (const auto path = robot_path_of(input.path)) robots.push_back({"the robot file of --cell", *path});
   }
   return robots;
 }
 
+/// The folder that `correct` makes for a program's files; empty: it makes none.
+std::string folder_of_program(const CLI::App& correct, const std::string& output) {
+  const std::vector<std::string>& inputs = correct.get_option("input")->results();
+  const auto& format = correct.get_option("--format")->results();
+  if (!is_program(inputs, format.empty() ? "" : format.front()) || output == "-") return "";
+  std::error_code error;
+  const auto is_folder = [&](const std::string& path) { return fs::is_directory(path, error); };
+  if (inputs.size() > 1 || output.ends_with('/') || is_folder(output) || is_folder(inputs.front())) return output;
+  const std::string parent = fs::path(output).parent_path().string();
+  return parent.empty() ? "." : parent;
+}
+
+/// The folder that the command makes where it is not there; empty: it makes none.
+std::string folder_that_is_made(const CLI::App& command) {
+  if (command.get_name() != "correct" && command.get_name() != "manual") return "";
+  const std::string output = command.get_option("--output")->as<std::string>();
+  return command.get_name() == "manual" ? output : folder_of_program(command, output);
+}
+
+/// That the folder may be written to, or can be made. What is a file is refused by whoever needs a folder.
+Status check_can_be_made(const std::string& folder) {
+  std::error_code error;
+  if (fs::exists(folder, error) && !fs::is_directory(folder, error)) return {};
+  fs::path there = fs::weakly_canonical(fs::absolute(folder, error), error);
+  while (!there.empty() && there != there.root_path() && !fs::exists(there, error)) there = there.parent_path();
+  const Status writable = check_writable((there / "a file").string());
+  if (writable) return {};
+  Error refusal = writable.error();
+  refusal.file = folder;
+  return Failure(std::move(refusal));
+}
+
+bool same_folder(const fs::path& a, const fs::path& b) {
+  std::error_code error;
+  const auto place = [&](const fs::path& folder) {
+    return fs::weakly_canonical(fs::absolute(folder / "a file", error), error);
+  };
+  return place(a) == place(b);  // with a slash behind it or not
+}
+
+/// Whether the output is, or lies in, a folder that the command makes.
+bool comes_into(const std::string& made, const std::string& path) {
+  if (made.empty()) return false;
+  std::error_code error;
+  if (fs::is_directory(made, error)) return same_folder(path, made);
+  const fs::path parent = fs::path(path).parent_path();
+  return same_folder(path, made) || same_folder(parent.empty() ? fs::path(".") : parent, made);
+}
+
 }  // namespace
 
-Status check_inputs_are_spared(const CLI::App& command) {
-  std::vector<Given> inputs = files_given(command, false);
-  for (Given& robot : robots_of(inputs)) inputs.push_back(std::move(robot));
-  for (const Given& output : files_given(command, true)) {
-    for (const Given& input : inputs) {
-      std::error_code error;
-      if (!std::filesystem::equivalent(output.path, input.path, error)) continue;
-      return failure(ErrorCode::kUsage, "{} {} would overwrite {}", output.option, output.path, input.option)
-          .of(output.option)
-          .with_text(output.path)
-          .next("name another file");
-    }
+Status check_outputs(const CLI::App& command) {
+  std::vector<NamedFile> inputs = inputs_of(command);
+  for (NamedFile& robot : robots_of(inputs)) inputs.push_back(std::move(robot));
+  const std::string made = folder_that_is_made(command);
+  Outputs apart, outputs;
+  for (const NamedFile& output : outputs_of(command)) {
+    const bool refits = command.get_name() == "train" && output.option == "--output";
+    const std::string replaces = refits ? "--from" : "";
+    apart.add(output.option, output.path, replaces);
+    if (!comes_into(made, output.path)) outputs.add(output.option, output.path, replaces);
   }
-  return {};
+  if (const Status spared = apart.check_apart(inputs); !spared) return spared;
+  if (!made.empty()) {
+    if (const Status can_be = check_can_be_made(made); !can_be) return can_be;
+  }
+  return outputs.check(inputs);
 }
 
 }  // namespace trammel::cli

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <filesystem>
 #include <set>
 
@@ -223,7 +224,41 @@ std::optional<Error> unknown_word(const CLI::App& app, const std::vector<std::st
   return std::nullopt;
 }
 
-Error usage_error(const CLI::ParseError& error, const std::string& command) {
+namespace {
+
+bool is_number(const std::string& word) {
+  char* end = nullptr;
+  std::strtod(word.c_str(), &end);
+  return !word.empty() && end == word.c_str() + word.size();
+}
+
+/// What is wrong with a word that stands where `option` takes a number; empty where it is one.
+std::string no_number(const CLI::App& app, const std::string& command, const std::string& option,
+                      const std::string& word) {
+  const CLI::App* of = command_of(app, command);
+  const CLI::Option* taken = of == nullptr || option.empty() ? nullptr : of->get_option_no_throw(option);
+  const std::string type = taken == nullptr ? "" : taken->get_type_name();
+  const bool is_whole = type.starts_with("INT") || type.starts_with("UINT");
+  const bool has_digits_alone = !word.empty() && word.find_first_not_of("0123456789") == std::string::npos;
+  if (is_whole && is_number(word) && !has_digits_alone && word[0] != '-')
+    return fmt::format("{} is no whole number", shown_short(word));
+  if (is_number(word)) return "";
+  return fmt::format("{} is no {}number", shown_short(word), is_whole ? "whole " : "");
+}
+
+/// The word that the parser's sentence is about: `--count: Value abc not in range 1 to 9`, `--domain = abc`.
+std::string word_in(const std::string& what, bool unconverted) {
+  const std::string before = ": Value ", behind = " not in range ";
+  const std::size_t begin = what.find(before), end = what.rfind(behind);
+  if (begin != std::string::npos && end != std::string::npos && end >= begin + before.size())
+    return what.substr(begin + before.size(), end - begin - before.size());
+  const std::size_t equals = unconverted ? what.find(" = ") : std::string::npos;
+  return equals == std::string::npos ? "" : what.substr(equals + 3);
+}
+
+}  // namespace
+
+Error usage_error(const CLI::App& app, const CLI::ParseError& error, const std::string& command) {
   // The parser tells the option in its sentence alone: `Could not convert: --seed = x`, `--cell is required`.
   std::string what = error.what();
   const std::size_t behind = what.find(": ");
@@ -231,11 +266,31 @@ Error usage_error(const CLI::ParseError& error, const std::string& command) {
       dynamic_cast<const CLI::ConversionError*>(&error) != nullptr && behind != std::string::npos && !is_option(what);
   if (unconverted) what.erase(0, behind + 2);
   const std::string option = is_option(what) ? what.substr(0, what.find_first_of(": ")) : "";
-  return failure(ErrorCode::kUsage, "{}", unconverted ? what + ": not a number, or out of range" : what)
+  const std::string word = word_in(what, unconverted);
+  const std::string none = word.empty() ? "" : no_number(app, command, option, word);
+  if (!none.empty())
+    what = option + ": " + none;
+  else if (unconverted)
+    what += ": not a number, or out of range";
+  return failure(ErrorCode::kUsage, "{}", what)
       .of(option)
+      .with_text(shown_short(word))
       .next(command.empty() ? "trammel help lists commands and topics"
                             : fmt::format("trammel {} --help tells its options, with examples", command))
       .value();
+}
+
+std::optional<Error> empty_word(const CLI::App& command) {
+  for (const char* name : {"--cell", "--model", "--batch", "--robot", "--truth", "--plan", "--joints", "--output"}) {
+    const CLI::Option* option = command.get_option_no_throw(name);
+    const std::vector<std::string> said = option == nullptr ? std::vector<std::string>() : option->results();
+    if (std::find(said.begin(), said.end(), "") == said.end()) continue;
+    return failure(ErrorCode::kUsage, "{} is empty", name)
+        .of(name)
+        .next("it may come from a variable of a script that is not set")
+        .value();
+  }
+  return std::nullopt;
 }
 
 Error advised(Error error, const CLI::App& command) {

@@ -67,24 +67,26 @@ constexpr std::array kTopics = {
         "--bias spells the kernel of what is learned of the rest: se, matern32, matern52, none, auto, sums and "
         "products of them. An \"rbf\" kernel of other programs is called se here."},
     HelpTopic{
-        "service", "asking a daemon, and which one (--port, --host, --domain)",
+        "service", "asking a daemon, and which one (--port, --host)",
         "With --service, or for commands that only a daemon can do, trammel asks a running trammeld on this host:\n"
         "  trammeld --config config/server.yaml --check\n"
         "  deploy/supervise trammeld --config config/server.yaml\n"
         "  trammel status\n"
         "\n"
-        "It looks at --host 127.0.0.1, --port 17500, --domain 0. Once --port for each replica. trammel doctor says "
+        "It looks at --host 127.0.0.1, --port 17500, --domain 0. Once --port for each replica. Where a discovery "
+        "server runs (dds: discovery_servers of the server file), --discovery-server HOST instead: it tells where "
+        "services are. trammel doctor says "
         "what is in the way where nothing answers."},
-    HelpTopic{
-        "defaults", "one file for what you would say every time (TRAMMEL_DEFAULTS)",
-        "The file that the environment variable TRAMMEL_DEFAULTS names, else ~/.config/trammel/defaults, holds "
-        "options as name = value, one a line; # begins a comment:\n"
-        "  port = 17501\n"
-        "  cell = /data/cells/cell-7.yaml\n"
-        "\n"
-        "Taken are host, port, domain, timeout, cell, tool, payload and seed, by each command that has the option, "
-        "cell only where a command needs one. What the command line says comes first. TRAMMEL_DEFAULTS= (empty) "
-        "takes none."},
+    HelpTopic{"defaults", "one file for what you would say every time",
+              "The file that the environment variable TRAMMEL_DEFAULTS names, else ~/.config/trammel/defaults, holds "
+              "options as name = value, one a line; # begins a comment:\n"
+              "  port = 17501\n"
+              "  cell = /data/cells/cell-7.yaml\n"
+              "\n"
+              "Taken are host, discovery-server, port, domain, timeout, cell, tool, payload and seed, by each command "
+              "that has the option, cell only where a command needs one. What the command line says comes first. "
+              "TRAMMEL_DEFAULTS= (empty) "
+              "takes none."},
     HelpTopic{"exit-codes", "what a script may rely on",
               "0 done; 1 done but not all (targets left as they were, a new model not in force, findings of doctor); 2 "
               "wrong usage; 3 refused data; 4 service unreachable or busy. With --json - a refusal is JSON too: "

@@ -1,5 +1,6 @@
 #include "clients/cli/text/service_text.h"
 
+#include <algorithm>
 #include <ctime>
 #include <map>
 #include <optional>
@@ -238,10 +239,16 @@ std::string state_of(const client::BatchOfService& batch) {
 
 std::string batches_text(const std::vector<client::BatchOfService>& batches) {
   if (batches.empty()) return "no batches\n";
-  std::string text = fmt::format("{:<16}{:<24}{:>7}  {:<18}{}\n", "cell", "batch", "poses", "accepted", "state");
+  // Each server says what it knows of a batch, which may differ.
+  const bool several = std::any_of(batches.begin(), batches.end(), [&](const client::BatchOfService& one) {
+    return one.server != batches.front().server;
+  });
+  const auto server = [&](const std::string& name) { return several ? fmt::format("{:<16}", name) : ""; };
+  std::string text =
+      fmt::format("{}{:<16}{:<24}{:>7}  {:<18}{}\n", server("server"), "cell", "batch", "poses", "accepted", "state");
   for (const client::BatchOfService& one : batches) {
-    text += fmt::format("{:<16}{:<24}{:>7}  {:<18}{}\n", one.cell, one.batch, one.poses, date_text(one.accepted_unix_s),
-                        state_of(one));
+    text += fmt::format("{}{:<16}{:<24}{:>7}  {:<18}{}\n", server(one.server), one.cell, one.batch, one.poses,
+                        date_text(one.accepted_unix_s), state_of(one));
   }
   return text + "(dates in UTC)\n";
 }
@@ -249,7 +256,8 @@ std::string batches_text(const std::vector<client::BatchOfService>& batches) {
 ordered_json batches_json(const std::vector<client::BatchOfService>& batches) {
   ordered_json list = ordered_json::array();
   for (const client::BatchOfService& one : batches) {
-    list.push_back({{"cell", one.cell},
+    list.push_back({{"server", one.server},
+                    {"cell", one.cell},
                     {"batch", one.batch},
                     {"poses", one.poses},
                     {"accepted_unix_s", one.accepted_unix_s},
@@ -284,6 +292,26 @@ std::string in_force_text(const ordered_json& now) {
   return next.empty() ? text : text + fmt::format("next: {}, if it is not wanted\n", next);
 }
 
+bool put_in_force(const client::JobStatus& job) {
+  if (job.verdict == "in_force") return true;
+  const bool says_so = job.verdict != "open";
+  return !says_so && job.in_force;
+}
+
+std::string ended_text(const client::JobStatus& job) {
+  std::string text = fmt::format("job {} of cell {} {}", job.job, job.cell, job.stage);
+  const bool then = put_in_force(job);
+  if (job.model_version > 0) {
+    const char* what = then == job.in_force ? (then ? "in force" : "not in force")
+                       : then               ? "was put in force, and another version is in force now"
+                                            : "was not put in force by the job, and is in force now";
+    text += fmt::format(": version {}, {}", job.model_version, what);
+  }
+  const bool has_changed = job.model_version > 0 && then != job.in_force;
+  if (!job.what.empty()) text += fmt::format("\n{}{}", has_changed ? "when it ended: " : "", job.what);
+  return text + "\n";
+}
+
 std::string next_step(const client::JobStatus& job) {
   if (job.verdict == "quarantined") {
     return fmt::format(
@@ -291,7 +319,7 @@ std::string next_step(const client::JobStatus& job) {
         "{0} --batch ID --release learns from it, if it is good",
         job.cell);
   }
-  if (job.model_version > 0 && !job.in_force) {
+  if (job.model_version > 0 && !job.in_force && !put_in_force(job)) {
     return fmt::format("next: trammel activate --service --model {}@{} puts it in force, if it is wanted", job.cell,
                        job.model_version);
   }

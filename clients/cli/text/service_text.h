@@ -29,7 +29,7 @@ namespace trammel::cli {
 [[nodiscard]] std::string quarantine_text(const std::vector<client::BatchOfService>& batches);
 
 [[nodiscard]] nlohmann::ordered_json batches_json(const std::vector<client::BatchOfService>& batches);
-/// A line a batch.
+/// A line a batch, with the server that says it where there are several.
 [[nodiscard]] std::string batches_text(const std::vector<client::BatchOfService>& batches);
 
 /// A version that was put in force: before, after, limit, why, and what to do next, as far as the service says so.
@@ -39,6 +39,10 @@ namespace trammel::cli {
 /// The same for people.
 [[nodiscard]] std::string in_force_text(const nlohmann::ordered_json& now);
 
+/// Whether the job put the model that it made in force, whatever is in force now.
+[[nodiscard]] bool put_in_force(const client::JobStatus& job);
+/// How a job ended that did not fail.
+[[nodiscard]] std::string ended_text(const client::JobStatus& job);
 /// What to do next where a job did not put a model in force, by its verdict; empty where there is nothing.
 [[nodiscard]] std::string next_step(const client::JobStatus& job);
 
