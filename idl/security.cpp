@@ -171,8 +171,8 @@ std::string role_in(const std::string& permissions) {
   const std::size_t colon = permissions.find(": ", begin);
   if (end == std::string::npos || colon >= end) return {};
   const std::string role = permissions.substr(colon + 2, end - colon - 2);
-  constexpr std::array<std::string_view, 5> known{"replica", "observer", "cam", "metrologist", "engineer"};
-  return std::find(known.begin(), known.end(), role) == known.end() ? std::string() : role;
+  constexpr std::array<std::string_view, 5> kKnown{"replica", "observer", "cam", "metrologist", "engineer"};
+  return std::find(kKnown.begin(), kKnown.end(), role) == kKnown.end() ? std::string() : role;
 }
 
 struct NamePart {
