@@ -4,6 +4,7 @@
 #include "server/base/units.h"
 #include "server/compensate/compensated_model.h"
 #include "server/compensate/correct_in_wrist.h"
+#include "server/compensate/few_joints.h"
 #include "server/measurement/pose_columns.h"
 #include "server/robot/branch_hint.h"
 #include "server/robot/flange_motion.h"
@@ -69,39 +70,49 @@ std::string direction_text(const Vector3& direction_B) {
   return fmt::format("({:.2f}, {:.2f}, {:.2f})", d.x(), d.y(), d.z());
 }
 
-/// Which way the flange cannot go, of the base.
+/// Which way the flange cannot go, of the base; of fewer than six joints, which of the ways that they have.
 std::string immovable(const Chain& robot, const JointVector& q) {
   const Eigen::MatrixXd J = flange_motion(robot, q).jacobian;
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(J, Eigen::ComputeFullU);
-  const Vector6 lost = svd.matrixU().col(5);
+  const Vector6 lost = svd.matrixU().col(std::min<Eigen::Index>(J.cols(), 6) - 1);
   if (lost.tail<3>().norm() > lost.head<3>().norm())
     return "it cannot turn about " + direction_text(lost.tail<3>()) + " of its base";
   return "it cannot move along " + direction_text(lost.head<3>()) + " of its base";
 }
 
-/// What an approach in the wrist left of the rotation; empty: nothing.
-std::string turn_left(const Vector3& missing_B) {
+/// What is left of a rotation that the arm cannot turn away; empty: nothing.
+std::string turn_left(const Chain& robot, const Vector3& missing_B) {
   if (missing_B.norm() < kTurnTold) return "";
-  return fmt::format("at a singular wrist {:.4f} deg about {} of the base are left", to_deg(missing_B.norm()),
-                     direction_text(missing_B));
+  return fmt::format("{} {:.4f} deg about {} of the base are left",
+                     has_few_joints(robot) ? fmt::format("with {} joints", robot.size()) : "at a singular wrist",
+                     to_deg(missing_B.norm()), direction_text(missing_B));
 }
 
-/// Whether the arm passes a singularity, to another configuration, from one of these joints to the other.
+/// Whether the arm passes a singularity, to another configuration, from one of these joints to the other: between two
+/// near places its Jacobians then differ in the sense of one motion.
 bool changes_configuration(const Chain& robot, const JointVector& from, const JointVector& to) {
-  const auto determinant = [&](const JointVector& q) {
-    const Eigen::MatrixXd J = flange_motion(robot, q).jacobian;
-    return J.cols() == J.rows() ? J.determinant() : 1.0;
-  };
-  return determinant(from) * determinant(to) < 0;
+  const Eigen::MatrixXd before = flange_motion(robot, from).jacobian;
+  const Eigen::MatrixXd after = flange_motion(robot, to).jacobian;
+  const Eigen::MatrixXd both =
+      before.cols() > before.rows() ? Eigen::MatrixXd(before * after.transpose()) : before.transpose() * after;
+  return both.determinant() < 0;
 }
 
-std::string why_not(const Chain& robot, const InverseResult& joints, const std::optional<int>& conf) {
+/// Why these joints do not bring the tool to `X_BT`.
+std::string why_not(const Chain& robot, const Pose& X_BT, const Pose& X_FT, const InverseResult& joints,
+                    const std::optional<int>& conf) {
   switch (joints.status) {
     case InverseStatus::kJointLimit:
       return limits_text(robot, joints.q);
     case InverseStatus::kSingular:
       return "the arm is singular there: " + immovable(robot, joints.q);
     default:
+      if (has_few_joints(robot) && point_is_reached(robot, X_BT, X_FT, joints.q)) {
+        const Vector3 missing_B = pose_difference(X_BT, robot.flange_pose(joints.q) * X_FT).tail<3>();
+        return fmt::format(
+            "the arm has {} joints and cannot turn the tool so: {:.4f} deg about {} of its base are missing",
+            robot.size(), to_deg(missing_B.norm()), direction_text(missing_B));
+      }
       return conf ? fmt::format("no joints of conf {} bring the tool there", *conf) : "no joints bring the tool there";
   }
 }
@@ -167,6 +178,8 @@ Result<InverseResult> CompensatedModel::nominal_joints(const Target& target, con
     return InverseResult{outside ? InverseStatus::kJointLimit : InverseStatus::kOk, *target.seed, 0};
   }
   if (target.conf) return inverse_kinematics(robot, target.X_BT * X_TF, *target.conf, target.seed);
+  if (target.seed && has_few_joints(robot))
+    return inverse_kinematics_of_few(robot, target.X_BT, X_TF.inverse(), *target.seed);
   if (target.seed) return inverse_kinematics(robot, target.X_BT * X_TF, *target.seed);
   return refused("a target needs a branch (conf) or joints as a seed").of("conf");
 }
@@ -185,21 +198,25 @@ CompensatedModel::Approach CompensatedModel::approach(const Pose& X_BT_wanted, P
   const Pose X_BT_calibrated = calibrated_pose_B(context);
   LearnedMotion learned{X_BT_predicted.translation() - X_BT_calibrated.translation(),
                         X_BT_predicted.linear() * X_BT_calibrated.linear().transpose()};
+  const MissingAt missing_at = [&](const JointVector& q, bool anew) {
+    context.q = q;
+    if (anew) learned = learned_motion(context, bias_weight);
+    return pose_difference(X_BT_wanted, moved(calibrated_pose_B(context), learned));
+  };
+  const Pose X_FT = X_TF.inverse();
+  std::optional<CorrectedJoints> by_steps;
   if (const auto wrist = closing_wrist(cell().robot, context.q)) {
-    const MissingAt missing_at = [&](const JointVector& q, bool anew) {
-      context.q = q;
-      if (anew) learned = learned_motion(context, bias_weight);
-      return pose_difference(X_BT_wanted, moved(calibrated_pose_B(context), learned));
-    };
-    const Pose X_FT = X_TF.inverse();
-    const CorrectedInWrist found =
-        correct_in_wrist(cell().robot, X_FT, *wrist, context.q, now.missing, missing_at, options);
-    now.X_BT_commanded = cell().robot.flange_pose(found.q) * X_FT;
-    now.joints.q = found.q;
-    if (cell().robot.joint_outside_limits(found.q)) now.joints.status = InverseStatus::kJointLimit;
-    now.missing = found.missing;
-    now.iterations = found.iterations;
-    now.settled = found.settled;
+    by_steps = correct_in_wrist(cell().robot, X_FT, *wrist, context.q, now.missing, missing_at, options);
+  } else if (has_few_joints(cell().robot)) {
+    by_steps = correct_few_joints(cell().robot, X_FT, context.q, now.missing, missing_at, options);
+  }
+  if (by_steps) {
+    now.X_BT_commanded = cell().robot.flange_pose(by_steps->q) * X_FT;
+    now.joints.q = by_steps->q;
+    if (cell().robot.joint_outside_limits(by_steps->q)) now.joints.status = InverseStatus::kJointLimit;
+    now.missing = by_steps->missing;
+    now.iterations = by_steps->iterations;
+    now.settled = by_steps->settled;
     return now;
   }
   while (!settled() && now.iterations < options.max_iterations) {
@@ -246,9 +263,10 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
     return result;
   };
   const auto not_reached = [&](const InverseResult& joints) {
-    return end(status_of(joints.status),
-               with_branch_hint(why_not(cell().robot, joints, target.conf),
-                                branches_that_reach(target, result.X_BT_wanted, context, options)));
+    return end(
+        status_of(joints.status),
+        with_branch_hint(why_not(cell().robot, result.X_BT_wanted, parts().physics.tools.at(tool), joints, target.conf),
+                         branches_that_reach(target, result.X_BT_wanted, context, options)));
   };
 
   const Result<InverseResult> start = nominal_joints(target, parts().physics.tools.at(tool).inverse());
@@ -282,7 +300,8 @@ Correction CompensatedModel::correct(const Target& target, const std::string& to
   result.X_BT_commanded = found.X_BT_commanded;
   result.q = found.joints.q;
   expect_after(before, found.missing, cell().tracker, result);
-  const std::string left = in_wrist ? turn_left(found.missing.tail<3>()) : "";
+  const bool turns_all = !in_wrist && !has_few_joints(cell().robot);
+  const std::string left = turns_all ? "" : turn_left(cell().robot, found.missing.tail<3>());
   if (before.in_domain) return end(CorrectionStatus::kOk, left);
   return end(CorrectionStatus::kOutOfDomain,
              corrected_by(inside_->bias, bias_weight) + (left.empty() ? "" : "; " + left));

@@ -12,8 +12,6 @@ constexpr double kBorder = 0.105;
 constexpr double kMostDamping = 0.06;   // of the idle motion, at the singularity: its square is more than what is left
 constexpr int kFreeSteps = 6;           // that choose the idle motion; then it stays, and the rest settles
 constexpr double kMostOfOpening = 0.9;  // that a correction may take: the wrist never opens to the other side
-constexpr double kSettled = 1e-8;       // rad, of a step
-constexpr double kRegular = 1e-12;
 
 /// Whatever a correction asks for, cut smoothly so that it never reaches the whole opening.
 double cut(double asked, double opening) {
@@ -68,15 +66,9 @@ class WristSteps {
     }
     if (held_) hold(wrist_.idle, 0);
     if (change) hold(wrist_.by_joint, *change - wrist_.by_joint.dot(so_far));
-    const Eigen::Index m = held.rows();
-    Eigen::MatrixXd K = Eigen::MatrixXd::Zero(n + m, n + m);
-    K.topLeftCorner(n, n) = turn.transpose() * turn + square_ * wrist_.idle * wrist_.idle.transpose();
-    K.topLeftCorner(n, n).diagonal().array() += kRegular;
-    K.topRightCorner(n, m) = held.transpose();
-    K.bottomLeftCorner(m, n) = held;
-    Eigen::VectorXd right(n + m);
-    right << turn.transpose() * missing.tail<3>() - square_ * wrist_.idle.dot(so_far) * wrist_.idle, values;
-    return K.fullPivLu().solve(right).head(n);
+    return least_with_held(turn.transpose() * turn + square_ * wrist_.idle * wrist_.idle.transpose(),
+                           turn.transpose() * missing.tail<3>() - square_ * wrist_.idle.dot(so_far) * wrist_.idle, held,
+                           values);
   }
 
   const Chain& robot_;
@@ -94,25 +86,15 @@ std::optional<WristOpening> closing_wrist(const Chain& robot, const JointVector&
   return wrist_opening(robot, q, kBorder);
 }
 
-CorrectedInWrist correct_in_wrist(const Chain& robot, const Pose& X_FT, const WristOpening& wrist,
-                                  const JointVector& from, const Vector6& missing_at_start, const MissingAt& missing_at,
-                                  const CorrectOptions& options) {
-  const JointVector start = from;  // what `missing_at` writes to may be what the caller handed over
-  CorrectedInWrist now{start, missing_at_start};
-  bool asked_here = true;  // what was learned
+CorrectedJoints correct_in_wrist(const Chain& robot, const Pose& X_FT, const WristOpening& wrist,
+                                 const JointVector& start, const Vector6& missing_at_start, const MissingAt& missing_at,
+                                 const CorrectOptions& options) {
   WristSteps steps(robot, X_FT.translation(), wrist);
-  while (true) {
-    const JointVector step = steps.step(now.q, now.q - start, now.missing);
-    const bool still = step.norm() < kSettled && now.missing.head<3>().norm() < options.tolerance;
-    now.settled = still && asked_here;
-    if (now.settled || now.iterations == kFreeSteps + options.max_iterations) return now;
-    if (!still) {
-      now.q += step;
-      ++now.iterations;
-    }
-    asked_here = still;
-    now.missing = missing_at(now.q, still);
-  }
+  const auto next = [&](const JointVector& q, const JointVector& so_far, const Vector6& missing) {
+    return steps.step(q, so_far, missing);
+  };
+  return settle_joints(start, missing_at_start, next, missing_at, options.tolerance,
+                       kFreeSteps + options.max_iterations);
 }
 
 }  // namespace trammel

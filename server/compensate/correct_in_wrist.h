@@ -1,9 +1,8 @@
 #pragma once
 
-#include <functional>
 #include <optional>
 
-#include "server/compensate/correction.h"
+#include "server/compensate/joint_steps.h"
 #include "server/robot/wrist.h"
 
 /// Corrections near the wrist's singularity, where not every turn can be corrected: the tool's point comes to where it
@@ -14,20 +13,9 @@ namespace trammel {
 /// The wrist where it is so near to its singularity that correct_in_wrist() corrects; else empty.
 [[nodiscard]] std::optional<WristOpening> closing_wrist(const Chain& robot, const JointVector& q);
 
-/// Wanted - predicted pose of the tool with the arm at these joints, in B: m, rad. `anew`: what was learned is asked
-/// for there; else it is taken from where it was asked for last.
-using MissingAt = std::function<Vector6(const JointVector& q, bool anew)>;
-
-struct CorrectedInWrist {
-  JointVector q;
-  Vector6 missing;  ///< m, rad
-  int iterations = 0;
-  bool settled = false;
-};
-
 /// From the joints `start`, where `missing_at_start` is missing.
-[[nodiscard]] CorrectedInWrist correct_in_wrist(const Chain& robot, const Pose& X_FT, const WristOpening& wrist,
-                                                const JointVector& start, const Vector6& missing_at_start,
-                                                const MissingAt& missing_at, const CorrectOptions& options);
+[[nodiscard]] CorrectedJoints correct_in_wrist(const Chain& robot, const Pose& X_FT, const WristOpening& wrist,
+                                               const JointVector& start, const Vector6& missing_at_start,
+                                               const MissingAt& missing_at, const CorrectOptions& options);
 
 }  // namespace trammel

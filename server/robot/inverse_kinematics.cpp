@@ -84,7 +84,9 @@ bool is_singular(const Chain& chain, const JointVector& q) {
   return square.llt().info() != Eigen::Success;
 }
 
-InverseResult judged(const Chain& chain, const JointVector& q, int iterations) {
+}  // namespace
+
+InverseResult judged_joints(const Chain& chain, const JointVector& q, int iterations) {
   InverseResult result{InverseStatus::kOk, q, iterations};
   if (chain.joint_outside_limits(q)) {
     result.status = InverseStatus::kJointLimit;
@@ -94,15 +96,13 @@ InverseResult judged(const Chain& chain, const JointVector& q, int iterations) {
   return result;
 }
 
-}  // namespace
-
 InverseResult inverse_kinematics(const Chain& chain, const Pose& X_BF, const JointVector& seed) {
   TRAMMEL_CHECK(seed.size() == chain.size());
   const Descent inside = descend(chain, X_BF, seed, true);
-  if (inside.error <= kConverged) return judged(chain, inside.q, inside.iterations);
+  if (inside.error <= kConverged) return judged_joints(chain, inside.q, inside.iterations);
   const Descent free = descend(chain, X_BF, seed, false);
   const int iterations = inside.iterations + free.iterations;
-  if (free.error <= kConverged) return judged(chain, free.q, iterations);
+  if (free.error <= kConverged) return judged_joints(chain, free.q, iterations);
   return {InverseStatus::kUnreachable, inside.q, iterations};
 }
 
@@ -202,7 +202,7 @@ Result<InverseResult> inverse_kinematics(const Chain& chain, const Pose& X_BF, i
     return refused("conf is {}, limits 0 and 7", conf).of("conf").beyond(conf, conf < 0 ? 0 : 7);
   const auto q = joints_of_branch(chain, X_BF, conf, near);
   if (!q) return InverseResult{InverseStatus::kUnreachable, near.value_or(JointVector::Zero(6)), 0};
-  return judged(chain, *q, 0);
+  return judged_joints(chain, *q, 0);
 }
 
 std::optional<JointVector> joints_of_branch(const Chain& chain, const Pose& X_BF, int conf,

@@ -27,6 +27,9 @@ struct InverseResult {
 /// lengths in metres, is below 1e-3.
 [[nodiscard]] InverseResult inverse_kinematics(const Chain& chain, const Pose& X_BF, const JointVector& seed);
 
+/// What is to say of joints that bring the flange to where it is wanted: kOk, kJointLimit or kSingular, as above.
+[[nodiscard]] InverseResult judged_joints(const Chain& chain, const JointVector& q, int iterations);
+
 /// True when the chain is an elbow arm with a spherical wrist (axes 2 and 3 parallel, axes 4, 5, 6 through one point),
 /// so that its eight branches have a closed form.
 [[nodiscard]] bool has_spherical_wrist(const Chain& chain);

@@ -93,7 +93,7 @@ TEST(CellFile, RefusesWithFileKeyAndReason) {
             Refusal("cell.yaml", 5, "base: q_wxyz").beyond(std::sqrt(2.0), 1));
   EXPECT_EQ(refusal(with(cell, "version: 1", "version: 2"), robot), Refusal("cell.yaml", 2, "version").beyond(2, 1));
   EXPECT_EQ(refusal(cell, with(robot, "limits_deg: [-65, 85]", "limits_deg: [85, -65]")),
-            Refusal("cell.yaml (robot)", {}, "joints 2: limits").beyond(from_deg(85), from_deg(-65)));
+            Refusal("cell.yaml (robot)", 8, "joints 2: limits_deg").beyond(85, -65));
   EXPECT_EQ(refusal(cell + "cell: twice\n", robot), Refusal("cell.yaml", 3, "cell"));
   EXPECT_EQ(refusal("", robot), Refusal("cell.yaml"));
   EXPECT_FALSE(read_cell("/no/such/cell.yaml"));
