@@ -8,12 +8,14 @@
 #include <array>
 #include <charconv>
 #include <chrono>
+#include <fastdds/rtps/common/LocatorList.hpp>
 #include <string_view>
 #include <utility>
 
 #include "idl/guard/guard.h"
 #include "idl/heartbeat_pace.h"
 #include "idl/limits.h"
+#include "idl/lost_leases.h"
 #include "server/base/mutex.h"
 
 namespace trammel::wire {
@@ -26,6 +28,7 @@ using eprosima::fastrtps::rtps::SenderResource;
 
 constexpr std::chrono::milliseconds kBetweenLosses{500};
 constexpr std::uint16_t kDomainId = 0x000f, kUserData = 0x002c;
+constexpr std::uint16_t kLeaseDuration = 0x0002, kDefaultUnicast = 0x0031, kMetatrafficUnicast = 0x0032;
 constexpr std::string_view kMark = "trammel.domain=";
 
 std::optional<std::uint32_t> marked_domain(Bytes user_data) {
@@ -83,6 +86,33 @@ bool says_another_domain(Bytes announcement, std::uint32_t domain) {
   return false;
 }
 
+/// What an announcement says of where and for how long its participant is there.
+struct Place {
+  std::vector<std::uint64_t> sockets;
+  std::chrono::milliseconds lease{0};  // 0: not said
+};
+
+Place place_of(Bytes announcement) {
+  Place place;
+  if (announcement.size() < 4) return place;
+  Reader list(announcement.subspan(4), announcement[1] == 0x03);
+  while (const auto parameter = next_parameter(list)) {
+    Reader value(parameter->value, list.little_endian());
+    if (parameter->id == kLeaseDuration) {
+      place.lease = std::chrono::seconds(value.u32().value_or(0));
+      continue;
+    }
+    if (parameter->id != kMetatrafficUnicast && parameter->id != kDefaultUnicast) continue;
+    const auto kind = value.u32(), port = value.u32();
+    const auto address = value.take(16);
+    if (kind != std::uint32_t{LOCATOR_KIND_UDPv4} || !port || !address) continue;
+    std::uint64_t socket = *port;
+    for (const unsigned char octet : address->last(4)) socket = socket << 8 | octet;
+    place.sockets.push_back(socket);
+  }
+  return place;
+}
+
 /// True if `found` is true for any DATA in the message.
 template <typename Found>
 bool any_data(Bytes message, const Found& found) {
@@ -106,14 +136,24 @@ class Gate final : public rtps::ChainingTransport {
 
   bool send(SenderResource* below, const unsigned char* buffer, std::uint32_t size, LocatorsIterator* first,
             LocatorsIterator* last, const std::chrono::steady_clock::time_point& limit) override {
-    if (heard_ && size >= kHeader && !knows_itself_) {
+    if (size >= kHeader && !knows_itself_) {
       const MutexLock lock(mutex_);
       if (!knows_itself_) std::copy_n(buffer + kPrefixAt, kPrefix, own_prefix_.begin());
       knows_itself_ = true;
     }
     if (guard_) guard_->sent(Bytes(buffer, size));
     if (!pace_.lets_out(Bytes(buffer, size))) return true;
-    return below->send(buffer, size, first, last, limit);
+    if (!domain_) return below->send(buffer, size, first, last, limit);
+    const LostLeases::Time now = LostLeases::now();
+    leases_.awake(now);
+    const std::vector<std::uint64_t> silent = leases_.silent_sockets(now);
+    if (silent.empty()) return below->send(buffer, size, first, last, limit);
+    rtps::LocatorList rest;
+    for (; *first != *last; ++*first) {
+      if (std::find(silent.begin(), silent.end(), socket_of(**first)) == silent.end()) rest.push_back(**first);
+    }
+    rtps::Locators begin(rest.begin()), end(rest.end());
+    return rest.empty() || below->send(buffer, size, &begin, &end, limit);
   }
 
   void receive(rtps::TransportReceiverInterface* next, const unsigned char* buffer, std::uint32_t size,
@@ -122,10 +162,11 @@ class Gate final : public rtps::ChainingTransport {
     if (!passed) return;
     const Bytes message = *passed;
     if (domain_ && is_of_another_domain(message, *domain_)) return;
-    const bool own = heard_ && is_own(message);
-    if (own && is_to_be_lost(message)) return;
+    const bool own = is_own(message);
+    if (own && heard_ && is_to_be_lost(message)) return;
+    if (domain_ && !own && !is_let_in(message)) return;
     next->OnDataReceived(message.data(), static_cast<std::uint32_t>(message.size()), here, there);
-    if (own && is_announcement(message)) ++heard_->announcements;
+    if (own && heard_ && is_announcement(message)) ++heard_->announcements;
   }
 
  private:
@@ -140,6 +181,26 @@ class Gate final : public rtps::ChainingTransport {
   [[nodiscard]] bool is_own(Bytes message) const {
     if (!knows_itself_ || message.size() < kHeader) return false;
     return std::equal(own_prefix_.begin(), own_prefix_.end(), message.begin() + kPrefixAt);
+  }
+
+  bool is_let_in(Bytes message) {
+    if (message.size() < kHeader) return true;
+    const LostLeases::Time now = LostLeases::now();
+    leases_.awake(now);
+    LostLeases::Prefix prefix;
+    std::copy_n(message.begin() + kPrefixAt, kPrefix, prefix.begin());
+    if (!leases_.lets_in(prefix, now)) return false;
+    any_data(message, [&](const Data& data) {
+      if (data.writer != kAnnouncer) return false;
+      if (data.payload.empty()) {
+        leases_.left(prefix);
+        return true;
+      }
+      Place place = place_of(data.payload);
+      if (place.lease.count() > 0) leases_.announced(prefix, std::move(place.sockets), place.lease, now);
+      return true;
+    });
+    return true;
   }
 
   bool is_to_be_lost(Bytes message) {
@@ -161,6 +222,7 @@ class Gate final : public rtps::ChainingTransport {
   const std::shared_ptr<HeardOfItself> heard_;
   const std::unique_ptr<Guard> guard_;
   HeartbeatPace pace_;
+  LostLeases leases_{kLease};
   std::atomic<bool> knows_itself_{false};
   Mutex mutex_;
   std::array<unsigned char, kPrefix> own_prefix_{};         // written once, before knows_itself_
