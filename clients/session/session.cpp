@@ -175,7 +175,8 @@ struct Session::Participant {
     return made.caller.get();
   }
 
-  /// Sends one request. A server that follows another one names it, and that one is asked. A server that is busy has
+  /// Sends one request. A server that follows another one names it, and that one is asked; where it cannot be found by
+  /// what was named, this is said at once. A server that is busy has
   /// not done it and is asked again when it says, until the deadline; a change keeps its id.
   template <typename Operation>
   [[nodiscard]] Result<typename Operation::Reply::type> call(const typename Operation::Request::type& request,
@@ -189,6 +190,7 @@ struct Session::Participant {
       auto reply = (*caller)->call(request, route, until);
       if (const auto writer = reply ? writer_named(reply->header()) : std::nullopt;
           writer && ++referrals < kReferrals) {
+        if (!may_be_found(*writer, until)) return not_found(*writer, *reply);
         route.server = *writer;
         referral = std::move(*reply);
         continue;
@@ -205,12 +207,13 @@ struct Session::Participant {
 
   [[nodiscard]] Result<wire::ManageModelsReply> manage(const std::string& cell, wire::ManageAction action,
                                                        const ChangeOptions& change,
-                                                       wire::ManageModelsRequest request = {}) {
+                                                       wire::ManageModelsRequest request = {},
+                                                       const std::string& server = {}) {
     request.about().cell(cell);
     request.action(action);
     request.change(to_wire(change));
     request.reason(change.reason);
-    return call<wire::ManageModels>(request, {cell, {}, true});
+    return call<wire::ManageModels>(request, {cell, server, true});
   }
 
   [[nodiscard]] Result<std::int64_t> release(const std::string& cell, const std::vector<std::string>& batch_ids,
@@ -244,6 +247,21 @@ struct Session::Participant {
       replies.push_back(std::move(*reply));
     }
     return replies;
+  }
+
+  /// False where all servers that were named are there, and this one is none of them.
+  [[nodiscard]] bool may_be_found(const std::string& server, Clock::time_point until) {
+    const auto known = watch->wait_for_servers(options.servers.size(), until);
+    return known.size() < options.servers.size() ||
+           std::any_of(known.begin(), known.end(), [&](const KnownServer& one) { return one.id() == server; });
+  }
+  template <typename Reply>
+  [[nodiscard]] Failure not_found(const std::string& writer, const Reply& referral) const {
+    return failure(ErrorCode::kUnreachable, "{}; {} is not among the servers that were named ({})",
+                   error_of(referral.header()).message, writer, where_it_looked())
+        .of("server")
+        .with_text(writer)
+        .next(fmt::format("name the host and port of {}, too", writer));
   }
 
   [[nodiscard]] Failure not_allowed(const char* operation) const {
@@ -598,6 +616,15 @@ Result<int> Session::activate(const std::string& cell, int version, const Change
   const auto reply = participant_->manage(cell, wire::MANAGE_ACTIVATE, change, std::move(request));
   if (!reply) return tl::make_unexpected(reply.error());
   return reply->version();
+}
+
+Status Session::cancel(std::int64_t job) {
+  const auto found = participant_->find_job(job);
+  if (!found) return tl::make_unexpected(found.error());
+  wire::ManageModelsRequest request;
+  request.job(job);
+  return participant_->manage(found->second.cell(), wire::MANAGE_CANCEL_JOB, {}, std::move(request), found->first)
+      .map([](const auto&) {});
 }
 
 Result<int> Session::rollback(const std::string& cell, const ChangeOptions& change) {

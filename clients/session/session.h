@@ -93,6 +93,9 @@ class Session {
   /// From every server, for one cell or (empty) for all, oldest first: jobs that wait or run, and jobs that ended
   /// lately.
   [[nodiscard]] Result<std::vector<DatedJob>> jobs(const std::string& cell);
+  /// A job that waits is not begun, one that runs stops as soon as it can. kConflict: it is over. kRefused: several
+  /// servers have a job of this number.
+  [[nodiscard]] Status cancel(std::int64_t job);
   /// From every server: who changed what, of one cell or (empty) of all, since then (Unix time, s), the newest `most`
   /// (0: all).
   [[nodiscard]] Result<std::vector<AuditText>> audit(const std::string& cell, std::int64_t since_unix_s,

@@ -111,6 +111,12 @@ Status Store::set_quarantine(const std::string& cell, const std::string& id, con
       const auto batch = read_record(database, cell, id);
       if (!batch) return tl::make_unexpected(batch.error());
       if (batch->discarded) return discarded_failure(cell, id);
+      if (reason.empty() && batch->quarantine.empty())
+        return failure(ErrorCode::kConflict, "batch {} of cell {} is not in quarantine: {}", id, cell,
+                       batch->learned ? "a model was made of it" : "trainings may take it")
+            .of("batch")
+            .with_text(id)
+            .next("nothing is to be released; trammel retrain trains from it");
       if (batch->quarantine == reason) return ChangeOutcome{};
       change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", reason, cell, id);
       record_audit(

@@ -32,10 +32,10 @@ JobProgress progress_of(const StoredJob& job) {
   return progress;
 }
 
-JobOutcome cancelled_outcome() {
+JobOutcome cancelled_outcome(const std::string& who) {
   JobOutcome outcome;
   outcome.verdict = JobVerdict::kCancelled;
-  outcome.why = "cancelled on request";
+  outcome.why = who.empty() ? "cancelled on request" : "cancelled by " + who;
   return outcome;
 }
 

@@ -30,7 +30,7 @@ struct JobProgress {
 [[nodiscard]] JobProgress progress_of(const StoredJob& job);
 
 /// Of a job that somebody ended.
-[[nodiscard]] JobOutcome cancelled_outcome();
+[[nodiscard]] JobOutcome cancelled_outcome(const std::string& who);
 /// Of a job that ended with `error`.
 [[nodiscard]] JobOutcome failed_outcome(const Error& error, JobVerdict verdict);
 

@@ -37,6 +37,7 @@ std::optional<TakenJob> JobQueue::take(const std::stop_token& stop) {
   WaitingJob job = next();
   taken_ = job.id;
   cancelling_ = {};
+  cancelled_by_.clear();
   return TakenJob{std::move(job), cancelling_.get_token()};
 }
 
@@ -55,16 +56,22 @@ void JobQueue::put_down() {
   taken_.reset();
 }
 
-JobQueue::Cancelled JobQueue::cancel(std::int64_t id) {
+JobQueue::Cancelled JobQueue::cancel(std::int64_t id, const std::string& who) {
   std::stop_source source;
   {
     const MutexLock lock(mutex_);
     if (is_removed(id)) return Cancelled::kRemoved;
     if (taken_ != id) return Cancelled::kUnknown;
     source = cancelling_;
+    if (!source.stop_requested()) cancelled_by_ = who;  // the first one counts
   }
   source.request_stop();
   return Cancelled::kStopping;
+}
+
+std::string JobQueue::cancelled_by() const {
+  const MutexLock lock(mutex_);
+  return cancelled_by_;
 }
 
 bool JobQueue::remove(std::int64_t id) {

@@ -44,7 +44,10 @@ class JobQueue {
     kStopping,  ///< its turn has come: its token was told
     kUnknown    ///< it is not here
   };
-  [[nodiscard]] Cancelled cancel(std::int64_t id);
+  /// `who` asks for it, as the audit trail names people; empty: nobody knows.
+  [[nodiscard]] Cancelled cancel(std::int64_t id, const std::string& who = {});
+  /// Who asked that the job which is taken ends; empty: nobody did, or nobody knows who.
+  [[nodiscard]] std::string cancelled_by() const;
   /// Takes a job that waits out of the queue; false: it does not wait here.
   [[nodiscard]] bool remove(std::int64_t id);
 
@@ -63,6 +66,7 @@ class JobQueue {
   std::string last_cell_ TRAMMEL_GUARDED_BY(mutex_);  // whose turn it was
   std::optional<std::int64_t> taken_ TRAMMEL_GUARDED_BY(mutex_);
   std::stop_source cancelling_ TRAMMEL_GUARDED_BY(mutex_);  // of the one taken
+  std::string cancelled_by_ TRAMMEL_GUARDED_BY(mutex_);     // likewise
 };
 
 }  // namespace trammel

@@ -92,7 +92,7 @@ JobRunner::JobRunner(const CellBook& cells, Store& store, const ModelRegistry& r
                      ProgressBook& book, const TrainerOptions& options)
     : cells_(cells), store_(store), registry_(registry), history_(history), book_(book), options_(options) {}
 
-JobRunner::End JobRunner::run(std::int64_t id, const StopRequests& stop) {
+JobRunner::End JobRunner::run(std::int64_t id, const StopRequests& stop, const CancelledBy& cancelled_by) {
   const Attempt attempted = [&]() -> Attempt {
     try {
       return attempt(id, stop);
@@ -101,7 +101,7 @@ JobRunner::End JobRunner::run(std::int64_t id, const StopRequests& stop) {
       return tl::make_unexpected(Failed{broken.value(), JobVerdict::kBroken});
     }
   }();
-  return attempted ? End::kOver : end(id, attempted.error(), stop);
+  return attempted ? End::kOver : end(id, attempted.error(), stop, cancelled_by);
 }
 
 JobRunner::Attempt JobRunner::attempt(std::int64_t id, const StopRequests& stop) {
@@ -273,7 +273,8 @@ JobRunner::Attempt JobRunner::finish(const StoredJob& job, const Made& made, con
   return {};
 }
 
-JobRunner::End JobRunner::end(std::int64_t id, const Failed& failed, const StopRequests& stop) {
+JobRunner::End JobRunner::end(std::int64_t id, const Failed& failed, const StopRequests& stop,
+                              const CancelledBy& cancelled_by) {
   auto stored = store_.job(id);
   StoredJob job;
   job.id = id;
@@ -285,12 +286,13 @@ JobRunner::End JobRunner::end(std::int64_t id, const Failed& failed, const StopR
     return put_back(job, fmt::format("{}; it is tried again ({} of {})", why, job.attempts + 1, kMaxAttempts), true,
                     stop);
   JobProgress progress = progress_at(job, JobStage::kFailed);
-  progress.outcome = cancelled ? cancelled_outcome() : failed_outcome(failed.error, failed.verdict);
+  const std::string who = cancelled ? cancelled_by() : "";
+  progress.outcome = cancelled ? cancelled_outcome(who) : failed_outcome(failed.error, failed.verdict);
   add_cost(progress.outcome, failed.cost);
   progress.what = cancelled ? progress.outcome.why : why;
   if (!cancelled && failed.again) progress.what += fmt::format("; tried {} times", job.attempts);
-  const Status ended = once_the_disk_lets(id, {stop.service, {}},
-                                          [&] { return store_.set_job_failed(id, progress.what, progress.outcome); });
+  const Status ended = once_the_disk_lets(
+      id, {stop.service, {}}, [&] { return store_.set_job_failed(id, progress.what, progress.outcome, who); });
   if (ended) {
     book_.report(progress);
   } else if (ended.error().code != ErrorCode::kNotFound) {  // else its model is stored: it has not failed

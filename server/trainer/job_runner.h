@@ -27,11 +27,13 @@ class JobRunner {
   JobRunner(const CellBook& cells, Store& store, const ModelRegistry& registry, ModelHistory& history,
             ProgressBook& book, const TrainerOptions& options);
 
+  using CancelledBy = std::function<std::string()>;
   enum class End {
     kOver,  ///< it has an outcome
     kAgain  ///< it is queued again: its computing broke off, or the service stops
   };
-  [[nodiscard]] End run(std::int64_t job, const StopRequests& stop);
+  /// `cancelled_by` says who asked for it to end, where somebody did.
+  [[nodiscard]] End run(std::int64_t job, const StopRequests& stop, const CancelledBy& cancelled_by);
 
  private:
   /// How an attempt ended that made nothing.
@@ -63,7 +65,8 @@ class JobRunner {
   [[nodiscard]] Attempt finish(const StoredJob& job, const Made& made, const ComputeCost& cost,
                                const StopRequests& stop);
 
-  [[nodiscard]] End end(std::int64_t id, const Failed& failed, const StopRequests& stop);
+  [[nodiscard]] End end(std::int64_t id, const Failed& failed, const StopRequests& stop,
+                        const CancelledBy& cancelled_by);
   [[nodiscard]] End put_back(const StoredJob& job, const std::string& why, bool attempt_counts,
                              const StopRequests& stop);
   [[nodiscard]] Failed failed_by(const Computing& computing, const Error& error) const;

@@ -139,12 +139,14 @@ Result<std::vector<std::string>> Trainer::start() {
   worker_ = std::jthread([this](const std::stop_token& stop) {
     ::pthread_setname_np(::pthread_self(), "trainer");
     while (const auto taken = queue_.take(stop)) {
-      const JobRunner::End end = runner_.run(taken->job.id, {stop, taken->cancelled});
+      const JobRunner::End end =
+          runner_.run(taken->job.id, {stop, taken->cancelled}, [this] { return queue_.cancelled_by(); });
       if (end == JobRunner::End::kAgain) queue_.push(taken->job);
       if (end == JobRunner::End::kOver) prune(taken->job.cell, stop);
       queue_.put_down();
       // Asked for while its attempt ended: it waits again, and nobody told it.
-      if (end == JobRunner::End::kAgain && taken->cancelled.stop_requested()) static_cast<void>(cancel(taken->job.id));
+      if (end == JobRunner::End::kAgain && taken->cancelled.stop_requested())
+        static_cast<void>(cancel(taken->job.id, queue_.cancelled_by()));
     }
   });
   keeper_ = std::jthread([this, told = troubles()](const std::stop_token& stop) { keep_up(told, stop); });
@@ -418,7 +420,7 @@ Status Trainer::cancel(std::int64_t id, const std::string& who) {
   if (!asked_for) return tl::make_unexpected(asked_for.error());
   const auto over = [id] { return failure(ErrorCode::kConflict, "job {} is over", id).of("job").with_value(id); };
   if (job->state == JobState::kDone || job->state == JobState::kFailed) return over();
-  switch (queue_.cancel(id)) {
+  switch (queue_.cancel(id, who)) {
     case JobQueue::Cancelled::kStopping:
       return {};
     case JobQueue::Cancelled::kUnknown:
@@ -426,7 +428,7 @@ Status Trainer::cancel(std::int64_t id, const std::string& who) {
     case JobQueue::Cancelled::kRemoved:
       break;
   }
-  const JobOutcome outcome = cancelled_outcome();
+  const JobOutcome outcome = cancelled_outcome(who);
   if (auto ended = store_.set_job_failed(id, outcome.why, outcome, who); !ended) {
     queue_.push_front({id, job->cell, *asked_for});  // as if it had not been asked
     return ended;

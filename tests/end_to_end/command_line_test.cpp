@@ -946,6 +946,36 @@ TEST_F(CommandLineWithService, AnotherToolIsKeptApartShownAndReleased) {
   EXPECT_TRUE(json::parse(must_answer({"status", "--json", "-"}).out).at("quarantine").empty());
 }
 
+TEST_F(CommandLineWithService, AJobIsCancelledAndSaysSoAndOneThatIsOverIsNot) {
+  ASSERT_EQ(ask({"submit", "--cell", "cell-7", "--batch", folder_.write("first.csv", test::virtual_batch_csv(60, 1)),
+                 "--watch"})
+                .exit_code,
+            0);
+  const Finished over = ask({"cancel", "--job", "1"});
+  EXPECT_EQ(over.exit_code, kRefusedData);
+  EXPECT_NE(over.err.find("is over"), std::string::npos) << over.err;
+  EXPECT_EQ(ask({"cancel", "--job", "77"}).exit_code, kRefusedData);
+  // The first takes seconds, the second one waits.
+  ASSERT_EQ(ask({"submit", "--cell", "cell-7", "--batch", folder_.write("many.csv", test::virtual_batch_csv(500, 2))})
+                .exit_code,
+            0);
+  ASSERT_EQ(ask({"retrain", "--cell", "cell-7"}).exit_code, 0);
+  must_answer({"cancel", "--job", "3"});
+  const Finished watched = ask({"watch", "--job", "3"});
+  EXPECT_EQ(watched.exit_code, kRefusedData);
+  EXPECT_NE(watched.err.find("cancelled by"), std::string::npos) << watched.err;
+}
+
+TEST_F(CommandLineWithService, ABatchThatIsNotInQuarantineIsNotSaidToBeReleased) {
+  ASSERT_EQ(ask({"submit", "--cell", "cell-7", "--batch", folder_.write("first.csv", test::virtual_batch_csv(60, 1)),
+                 "--watch"})
+                .exit_code,
+            0);
+  const Finished released = ask({"release", "--cell", "cell-7", "--batch", "first"});
+  EXPECT_EQ(released.exit_code, kRefusedData);
+  EXPECT_NE(released.err.find("not in quarantine"), std::string::npos) << released.err;
+}
+
 TEST_F(CommandLineWithService, WhatTheServiceRefusesEndsWith3AndItsReason) {
   const Finished unknown = ask({"models", "--cell", "cell-99"});
   EXPECT_EQ(unknown.exit_code, kRefusedData);

@@ -195,6 +195,7 @@ TEST_F(StoreTest, KeepsWhyABatchIsInQuarantineUntilItIsReleased) {
   EXPECT_EQ(store_->batches("cell-7")->at(0).quarantine, "another tool");
   ASSERT_TRUE(store_->set_quarantine("cell-7", "lt-07", ""));
   EXPECT_EQ(store_->batch("cell-7", "lt-07")->quarantine, "");
+  EXPECT_EQ(store_->set_quarantine("cell-7", "lt-07", "").error().code, ErrorCode::kConflict) << "nothing to release";
   EXPECT_EQ(store_->set_quarantine("cell-7", "lt-08", "x").error().code, ErrorCode::kNotFound);
 }
 

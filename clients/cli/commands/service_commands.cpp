@@ -199,6 +199,12 @@ Status discard(client::Session& session, const ServiceArguments& arguments) {
                             "discarded", arguments);
 }
 
+Status cancel(client::Session& session, const ServiceArguments& arguments) {
+  if (const Status asked = session.cancel(arguments.job); !asked) return asked;
+  tell(fmt::format("job {} is cancelled; if it ran, it stops as soon as it can\n", arguments.job), {arguments.json});
+  return write_json(arguments.json, {{"job", arguments.job}, {"is", "cancelled"}});
+}
+
 /// What the service says of what is in force in the cell, with the figures it was judged by; null where it does not.
 ordered_json in_force_at(client::Session& session, const std::string& cell) {
   const auto cells = health_at(session, cell, 1);
@@ -394,6 +400,11 @@ void add_service_commands(CLI::App& app, Action& chosen) {
         command.add_option("--job", arguments.job, "Number of the job, as submit, retrain and status tell it")
             ->required();
         command.add_option("--limit", arguments.limit_s, "Longest wait, s")->check(above_zero())->capture_default_str();
+      });
+  commands.add(
+      "cancel", "Stop a training, a diagnosis or a check that waits or runs; the model in force stays", cancel,
+      [](CLI::App& command, ServiceArguments& arguments) {
+        command.add_option("--job", arguments.job, "Number of the job, as jobs and status tell it")->required();
       });
   commands.add("models", "List the history of a cell's models", list_models, add_cell);
   commands.add(

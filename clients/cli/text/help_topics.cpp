@@ -134,6 +134,7 @@ constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
     {"retrain", "  trammel retrain --cell cell-7 --batch b1 --batch b2 --watch"},
     {"status", "  trammel status --port 17500 --json -"},
     {"watch", "  trammel watch --job 12"},
+    {"cancel", "  trammel cancel --job 12"},
     {"models", "  trammel models --cell cell-7"},
     {"show", "  trammel show --model cell-7@3"},
     {"jobs", "  trammel jobs --cell cell-7"},
