@@ -147,13 +147,24 @@ struct Session::Participant {
     return fmt::format("{} ms, looking at{} in domain {}", options.timeout.count(), places, options.domain);
   }
 
+  /// Where no server answered. One that refuses a certificate is as silent as one that is not there.
+  [[nodiscard]] Error not_answered(Error error) const {
+    if (options.security.empty()) return error;
+    return Failure(std::move(error))
+        .next(
+            fmt::format("see that one runs there, and that its certificates and those in {} are of the same plant and "
+                        "not over: the server's log names whom it refused",
+                        options.security))
+        .value();
+  }
+
   /// An error reply of the server is an error here, and one of no server says where it was looked for.
   template <typename Reply>
   [[nodiscard]] Result<Reply> as_result(Result<Reply> reply) const {
     if (!reply && reply.error().code == ErrorCode::kUnreachable) {
       Error error = reply.error();
       error.message += fmt::format(" ({})", where_it_looked());
-      return Failure(std::move(error)).of("server").with_text(where_it_looked());
+      return Failure(not_answered(std::move(error))).of("server").with_text(where_it_looked());
     }
     if (reply && reply->header().result() != wire::RESULT_OK) return tl::make_unexpected(error_of(reply->header()));
     return reply;
@@ -272,7 +283,7 @@ struct Session::Participant {
 
   [[nodiscard]] Error no_server() const {
     if (auto other = watch->other_contract()) return *other;
-    return failure(ErrorCode::kUnreachable, "no server found ({})", where_it_looked()).value();
+    return not_answered(failure(ErrorCode::kUnreachable, "no server found ({})", where_it_looked()).value());
   }
 
   /// What `server` (empty: any) knows of the job.

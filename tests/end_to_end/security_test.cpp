@@ -80,6 +80,8 @@ class SecurityTest : public testing::Test {
     const auto servers = (*opened)->servers();
     ASSERT_FALSE(servers);
     EXPECT_EQ(servers.error().code, ErrorCode::kUnreachable);
+    // A server that refuses is as silent as none: who shows a certificate is told that this may be why.
+    EXPECT_EQ(servers.error().next.find("certificates") != std::string::npos, !folder.empty()) << servers.error().next;
   }
   [[nodiscard]] int refused_handshakes() const {
     const std::string text = test::http_get(http(), "/metrics").body;

@@ -192,7 +192,8 @@ std::string of_kind(const Error& error, const std::string& command) {
     case ErrorCode::kUsage:
       return fmt::format("trammel {} --help tells its options, with examples", command);
     case ErrorCode::kUnreachable:
-      return "start one (trammeld --config SERVER.yaml) or name its --port; trammel doctor says what is in the way";
+      return "start one (trammeld --config SERVER.yaml) or name its --port, and its --security where it asks for "
+             "certificates; trammel doctor says what is in the way";
     case ErrorCode::kBusy:
       return "run the command again in a moment";
     case ErrorCode::kNotFound:
