@@ -16,7 +16,7 @@ install(FILES deploy/security/README.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc
 install(FILES deploy/watching/alerts.yml deploy/watching/dashboard.json deploy/watching/prometheus.yml deploy/watching/README.md
   DESTINATION ${CMAKE_INSTALL_DATADIR}/trammel/watching COMPONENT trammeld)
 install(FILES deploy/discovery-server.xml DESTINATION ${CMAKE_INSTALL_DATADIR}/trammel COMPONENT trammeld)
-install(FILES deploy/trammeld.service DESTINATION lib/systemd/system COMPONENT trammeld)
+install(FILES deploy/trammeld.service deploy/trammel-discovery@.service DESTINATION lib/systemd/system COMPONENT trammeld)
 
 # libtrammel: find_package(Trammel), Trammel::trammel.
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/trammel)

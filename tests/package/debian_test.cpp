@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <regex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/support/process.h"
@@ -84,7 +85,8 @@ TEST_F(Debian, EachPackageHasItsFiles) {
                            "usr/share/trammel/models/truth/chapter-5\\.yaml", "usr/share/doc/trammel/copyright"});
   expect_files("trammeld", {"usr/bin/trammeld", "usr/libexec/trammel/supervise", "etc/trammel/server\\.yaml",
                             "etc/trammel/cell-7\\.yaml", "etc/logrotate\\.d/trammeld",
-                            "lib/systemd/system/trammeld\\.service", "usr/share/man/man8/trammeld\\.8\\.gz"});
+                            "lib/systemd/system/trammeld\\.service", "lib/systemd/system/trammel-discovery@\\.service",
+                            "usr/share/trammel/discovery-server\\.xml", "usr/share/man/man8/trammeld\\.8\\.gz"});
 }
 
 TEST_F(Debian, TheDaemonsManualHasEveryOption) {
@@ -128,7 +130,8 @@ TEST_F(Debian, WhatAHostConfiguresIsKeptOnUpgrades) {
   const test::TemporaryFolder control;
   ASSERT_EQ(test::run({"/usr/bin/dpkg-deb", "-e", package("trammeld"), control.path().string()}, kLimit).exit_code, 0);
   EXPECT_EQ(test::read_file(control.file("conffiles")),
-            "/etc/logrotate.d/trammeld\n/etc/trammel/cell-7.yaml\n/etc/trammel/server.yaml\n");
+            "/etc/logrotate.d/trammeld\n/etc/trammel/cell-7.yaml\n/etc/trammel/discovery-server.xml\n"
+            "/etc/trammel/server.yaml\n");
 }
 
 TEST_F(Debian, TheDaemonComesWithItsCommandLine) {
@@ -145,25 +148,32 @@ TEST_F(Debian, LintianFindsNoError) {
   EXPECT_EQ(found.exit_code, 0) << found.out << found.err;
 }
 
-TEST_F(Debian, SystemdTakesTheUnitAndFindsItHardlyExposed) {
+TEST_F(Debian, SystemdTakesTheUnitsAndFindsThemHardlyExposed) {
   if (!is_here("systemd-analyze")) GTEST_SKIP() << "no systemd-analyze here";
   const test::TemporaryFolder root;
   ASSERT_EQ(test::run({"/usr/bin/dpkg-deb", "-x", package("trammeld"), root.path().string()}, kLimit).exit_code, 0);
-  const std::string unit = root.file("lib/systemd/system/trammeld.service");
-  // Its programs are where the package was unpacked, not where it will be installed.
-  std::string text = test::read_file(unit);
-  for (const std::string program : {"/usr/libexec/trammel/supervise", "/usr/bin/trammeld"}) {
-    const std::size_t at = text.find(program);
-    ASSERT_NE(at, std::string::npos) << program;
-    text.insert(at, root.path().string());
+  // Its programs are where the package was unpacked, not where it will be installed; one is of a package that it only
+  // suggests.
+  const std::string here = root.path().string();
+  const std::vector<std::pair<std::string, std::string>> programs = {
+      {"/usr/libexec/trammel/supervise", here + "/usr/libexec/trammel/supervise"},
+      {"/usr/bin/trammeld", here + "/usr/bin/trammeld"},
+      {"/usr/bin/fast-discovery-server", "/bin/true"}};
+  for (const std::string name : {"trammeld.service", "trammel-discovery@.service"}) {
+    const std::string unit = root.file("lib/systemd/system/" + name);
+    std::string text = test::read_file(unit);
+    for (const auto& [installed, present] : programs) {
+      const std::size_t at = text.find(installed);
+      if (at != std::string::npos) text.replace(at, installed.size(), present);
+    }
+    const test::Finished verified =
+        test::run({"/usr/bin/systemd-analyze", "verify", "--man=no", root.write(name, text)}, kLimit);
+    EXPECT_EQ(verified.exit_code, 0) << name << ": " << verified.err;
+    EXPECT_EQ(verified.err.find("trammel"), std::string::npos) << verified.err;
+    const test::Finished exposed = test::run(
+        {"/usr/bin/systemd-analyze", "security", "--offline=yes", "--threshold=20", "--no-pager", unit}, kLimit);
+    EXPECT_EQ(exposed.exit_code, 0) << exposed.out << exposed.err;  // 20 stands for an exposure of 2.0
   }
-  const std::string here = root.write("trammeld.service", text);
-  const test::Finished verified = test::run({"/usr/bin/systemd-analyze", "verify", "--man=no", here}, kLimit);
-  EXPECT_EQ(verified.exit_code, 0) << verified.err;
-  EXPECT_EQ(verified.err.find("trammeld"), std::string::npos) << verified.err;
-  const test::Finished exposed = test::run(
-      {"/usr/bin/systemd-analyze", "security", "--offline=yes", "--threshold=20", "--no-pager", unit}, kLimit);
-  EXPECT_EQ(exposed.exit_code, 0) << exposed.out << exposed.err;  // 20 stands for an exposure of 2.0
 }
 
 }  // namespace
