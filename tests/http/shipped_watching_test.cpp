@@ -156,12 +156,14 @@ TEST(ShippedWatching, PromtoolParsesEveryQueryOfTheDashboard) {
   EXPECT_NE(done.out.find(fmt::format("{} rules found", count)), std::string::npos) << done.out;
 }
 
-TEST(ShippedWatching, PromtoolTakesTheRulesAndTheConfiguration) {
+TEST(ShippedWatching, PromtoolTakesTheRulesAndTheConfigurationAndTheRulesFireWhenTheyShould) {
   if (test::run({"/bin/sh", "-c", "command -v promtool"}).exit_code != 0)
     GTEST_SKIP() << "promtool is not there (package prometheus)";
   for (const std::vector<std::string>& command :
        {std::vector<std::string>{"promtool", "check", "rules", kFolder + "alerts.yml"},
-        std::vector<std::string>{"promtool", "check", "config", kFolder + "prometheus.yml"}}) {
+        std::vector<std::string>{"promtool", "check", "config", kFolder + "prometheus.yml"},
+        std::vector<std::string>{"promtool", "test", "rules",
+                                 TRAMMEL_SOURCE_DIR "/tests/http/alerts_of_replicas.yml"}}) {
     const auto done = test::run({"/usr/bin/env", command[0], command[1], command[2], command[3]});
     EXPECT_EQ(done.exit_code, 0) << done.out << done.err;
   }
