@@ -324,6 +324,22 @@ void add_watch(CLI::App& command, ServiceArguments& arguments) {
       ->capture_default_str();
 }
 
+/// What a job that runs may be asked.
+void add_running_jobs(ServiceCommands& commands) {
+  commands.add(
+      "watch", "Follow a training or a diagnosis until it is done, and say how it ended", watch,
+      [](CLI::App& command, ServiceArguments& arguments) {
+        command.add_option("--job", arguments.job, "Number of the job, as submit, retrain and status tell it")
+            ->required();
+        command.add_option("--limit", arguments.limit_s, "Longest wait, s")->check(above_zero())->capture_default_str();
+      });
+  commands.add(
+      "cancel", "Stop a training, a diagnosis or a check that waits or runs; the model in force stays", cancel,
+      [](CLI::App& command, ServiceArguments& arguments) {
+        command.add_option("--job", arguments.job, "Number of the job, as jobs and status tell it")->required();
+      });
+}
+
 /// What is in force, what may be learned from, and models as files.
 void add_model_changes(ServiceCommands& commands) {
   commands.add(
@@ -394,18 +410,7 @@ void add_service_commands(CLI::App& app, Action& chosen) {
       });
   commands.add("status", "Show the servers that answer, the models in force, jobs, and batches in quarantine", status,
                [](CLI::App&, ServiceArguments&) {});
-  commands.add(
-      "watch", "Follow a training or a diagnosis until it is done, and say how it ended", watch,
-      [](CLI::App& command, ServiceArguments& arguments) {
-        command.add_option("--job", arguments.job, "Number of the job, as submit, retrain and status tell it")
-            ->required();
-        command.add_option("--limit", arguments.limit_s, "Longest wait, s")->check(above_zero())->capture_default_str();
-      });
-  commands.add(
-      "cancel", "Stop a training, a diagnosis or a check that waits or runs; the model in force stays", cancel,
-      [](CLI::App& command, ServiceArguments& arguments) {
-        command.add_option("--job", arguments.job, "Number of the job, as jobs and status tell it")->required();
-      });
+  add_running_jobs(commands);
   commands.add("models", "List the history of a cell's models", list_models, add_cell);
   commands.add(
       "show", "Tell what a stored version of a cell's model is, and how large its errors were", show_model,
