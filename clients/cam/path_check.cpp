@@ -48,18 +48,18 @@ class Path {
 
   void check() {
     const ProgramMove* last = nullptr;
-    std::optional<std::size_t> before;
+    const std::size_t* before = nullptr;
     for (const ProgramMove& move : program_.moves) {
-      if (last != nullptr && last->file != move.file) before.reset();
+      if (last != nullptr && last->file != move.file) before = nullptr;
       last = &move;
       // An arc has two targets; more are one of an array, whichever a variable says.
       if (move.targets.empty() || move.targets.size() > 2) {
-        before.reset();
+        before = nullptr;
         continue;
       }
-      for (const std::size_t t : move.targets) {
-        if (before && program_.targets[t].linear) step(*before, t, move);
-        before = t;
+      for (const std::size_t& t : move.targets) {
+        if (before != nullptr && program_.targets[t].linear) step(*before, t, move);
+        before = &t;
       }
     }
     if (too_fast_ > 0) {

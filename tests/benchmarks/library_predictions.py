@@ -1,6 +1,6 @@
 """For library_benchmark: the processor time in which the Python package predicts the poses of a plan, and their errors' sum.
 
-    PYTHONPATH=build/dev/clients/python python3 library_predictions.py MODEL PLAN
+    PYTHONPATH=build/release/clients/python python3 library_predictions.py MODEL PLAN
 """
 
 import csv

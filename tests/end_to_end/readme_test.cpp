@@ -24,11 +24,12 @@ std::string text_of(const fs::path& path) {
   return text.str();
 }
 
-/// The blocks of commands (lines that are indented by four blanks) below `heading` of the README.
+/// The blocks of commands (lines that are indented by four blanks) below `heading` of the README; "" is what stands
+/// before the first.
 std::vector<std::vector<std::string>> commands_below(const std::string& heading) {
   std::ifstream readme(fs::path(TRAMMEL_SOURCE_DIR) / "README.md");
   std::vector<std::vector<std::string>> blocks;
-  bool here = false, in_block = false;
+  bool here = heading.empty(), in_block = false;
   for (std::string line; std::getline(readme, line);) {
     if (line.starts_with("## ")) here = line == "## " + heading;
     const bool command = here && line.starts_with("    ");
@@ -52,12 +53,12 @@ fs::path built_clone(const test::TemporaryFolder& folder) {
 
 TEST(Readme, TheFiveLinesRunAsTheyStandOnABuiltClone) {
   const auto blocks = commands_below("Try it");
-  ASSERT_EQ(blocks.size(), 2U) << "how to build, and the five lines";
-  ASSERT_EQ(blocks[1].size(), 5U);
+  ASSERT_EQ(blocks.size(), 1U);
+  ASSERT_EQ(blocks[0].size(), 5U);
   const test::TemporaryFolder folder;
   const fs::path clone = built_clone(folder);
   std::string script = "set -euo pipefail\ncd '" + clone.string() + "'\n";
-  for (const std::string& line : blocks[1]) script += line + "\n";
+  for (const std::string& line : blocks[0]) script += line + "\n";
   const test::Finished run = test::run({"/bin/bash", "-c", script}, std::chrono::minutes(4));
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const std::string corrected = text_of(clone / "build/corrected.csv");
@@ -67,21 +68,28 @@ TEST(Readme, TheFiveLinesRunAsTheyStandOnABuiltClone) {
   EXPECT_EQ(holes, 35) << corrected;
 }
 
-TEST(Readme, TheLinesThatBuildNameAScriptAndAPresetThatAreThere) {
-  const auto blocks = commands_below("Try it");
-  ASSERT_FALSE(blocks.empty());
-  const auto presets = nlohmann::json::parse(text_of(fs::path(TRAMMEL_SOURCE_DIR) / "CMakePresets.json"));
-  for (const std::string& line : blocks[0]) {
-    const std::string workflow = "cmake --workflow --preset ";
-    if (!line.starts_with(workflow)) {
-      EXPECT_TRUE(fs::exists(fs::path(TRAMMEL_SOURCE_DIR) / line)) << line;
-      continue;
-    }
-    const auto& known = presets.at("workflowPresets");
-    EXPECT_TRUE(std::any_of(known.begin(), known.end(), [&](const auto& preset) {
-      return preset.at("name") == line.substr(workflow.size());
-    })) << line;
+TEST(Readme, LeadsWithTheTwoCommandsEachAloneOnItsLine) {
+  const auto blocks = commands_below("");
+  ASSERT_EQ(blocks.size(), 2U);
+  EXPECT_EQ(blocks[0], std::vector<std::string>{"deploy/demo"});
+  EXPECT_EQ(blocks[1], std::vector<std::string>{"deploy/test"});
+  const std::string ci = text_of(fs::path(TRAMMEL_SOURCE_DIR) / ".ci/run");
+  for (const auto& block : blocks) {
+    EXPECT_TRUE(fs::exists(fs::path(TRAMMEL_SOURCE_DIR) / block[0]));
+    EXPECT_NE(ci.find("step " + block[0] + "\n"), std::string::npos) << ci;
   }
+}
+
+TEST(Readme, TheWorkflowThatItNamesIsThere) {
+  const std::string readme = text_of(fs::path(TRAMMEL_SOURCE_DIR) / "README.md"),
+                    workflow = "cmake --workflow --preset ";
+  const auto at = readme.find(workflow);
+  ASSERT_NE(at, std::string::npos);
+  const std::string name = readme.substr(at + workflow.size(), readme.find('`', at) - at - workflow.size());
+  const auto presets = nlohmann::json::parse(text_of(fs::path(TRAMMEL_SOURCE_DIR) / "CMakePresets.json"));
+  const auto& known = presets.at("workflowPresets");
+  EXPECT_TRUE(std::any_of(known.begin(), known.end(), [&](const auto& preset) { return preset.at("name") == name; }))
+      << name;
 }
 
 /// Every file that a page of the project links to or names as a place to look.
