@@ -18,8 +18,11 @@ foreach(room base robot measurement compensate store dds config idl_types idl id
   get_target_property(sources trammel_${room} SOURCES)
   get_target_property(folder trammel_${room} SOURCE_DIR)
   get_target_property(links trammel_${room} LINK_LIBRARIES)
-  if(room STREQUAL compensate)
-    list(FILTER sources INCLUDE REGEX "file")  # what reads and writes model files
+  # Of these rooms what reads and writes files, not their numerics.
+  if(room MATCHES "^(compensate|robot)$")
+    list(FILTER sources INCLUDE REGEX "(_file|/gauge|compensate/file/[a-z_]+)[.]cpp$")
+  elseif(room STREQUAL measurement)
+    list(FILTER sources INCLUDE REGEX "(measurement/files/[a-z_]+|/checked_batch|_columns|/split|/gauges)[.]cpp$")
   endif()
   list(TRANSFORM sources PREPEND ${folder}/ REGEX "^[^/]")
   add_library(${target} STATIC ${sources})

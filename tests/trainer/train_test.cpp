@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <random>
 
 #include "server/base/units.h"
@@ -11,8 +10,8 @@
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
 #include "tests/support/demand.h"
-#include "tests/support/figure.h"
 #include "tests/support/refusal.h"
+#include "tests/support/ur10.h"
 #include "tests/support/virtual_robot.h"
 
 namespace trammel {
@@ -260,107 +259,54 @@ TEST(Train, ABiasThatCannotBeSpelledIsRefusedInTheSpellersWords) {
             Refusal("", {}, "bias").text("se * joint_map"));
 }
 
-/// A real robot with base and tool unknown: ../shared/data, where it is at hand.
+/// A real robot with base and tool unknown, a fifth of its poses; `ur10_benchmark` has the figures of all.
 class RealRobot : public testing::Test {
  protected:
-  struct Figures {
-    double nominal_mm, geometry_mm, compensated_mm;
-  };
-  static std::shared_ptr<const Cell> cell() {
-    return std::make_shared<const Cell>(test::demand(read_cell(std::string(TRAMMEL_SOURCE_DIR) + "/config/ur10.yaml")));
+  static MeasurementBatch series(const std::string& name, int training) {
+    return test::ur10_series(name, training, 6, 6);
   }
-
-  /// The series with every pose held out whose id ends in 7, 8 or 9; of the rest every `stride`th, at most `training`.
-  static MeasurementBatch series(const std::string& name, int training = 1 << 30, int stride = 1) {
-    const MeasurementBatch all =
-        test::demand(read_batch_csv(std::string(TRAMMEL_SOURCE_DIR) + "/../shared/data/ur10_series_" + name + ".csv"));
-    MeasurementBatch batch = all;
-    batch.measurements.clear();
-    int seen = 0;
-    for (Measurement m : all.measurements) {
-      m.set = std::stoi(m.pose_id) % 10 >= 7 ? MeasurementSet::kValidation : MeasurementSet::kTrain;
-      if (m.set == MeasurementSet::kTrain && (seen++ % stride != 0 || training-- <= 0)) continue;
-      batch.measurements.push_back(std::move(m));
-    }
-    return batch;
-  }
-
-  static Figures figures(const std::string& name) {
-    const Evaluation evaluation =
-        *test::demand(train(cell(), series(name), quick("M3", "matern52"))).parts().validation;
-    const Figures figures{to_mm(evaluation.nominal.rms), to_mm(evaluation.calibrated.rms),
-                          to_mm(evaluation.compensated.rms)};
-    test::tell_figure("UR10 " + name + " nominal, mm", figures.nominal_mm);
-    test::tell_figure("UR10 " + name + " geometry and compliance, mm", figures.geometry_mm);
-    test::tell_figure("UR10 " + name + " with matern52, mm", figures.compensated_mm);
-    return figures;
-  }
+  static Evaluation held_out(const CompensatedModel& model) { return model.parts().validation.value(); }
   void SetUp() override {
-    if (!std::filesystem::exists(std::string(TRAMMEL_SOURCE_DIR) + "/../shared/data/ur10_series_c.csv")) {
-      GTEST_SKIP() << "the measured UR10 is not at hand (../shared/data)";
-    }
+    if (!test::has_ur10()) GTEST_SKIP() << "the measured UR10 is not at hand (../shared/data)";
   }
 };
 
-TEST_F(RealRobot, Ur10SeriesCIsExplainedAndCompensated) {
-  const Figures c = figures("c");
-  EXPECT_LE(c.nominal_mm, 1.05);
-  EXPECT_LE(c.geometry_mm, 0.50);
-  EXPECT_LE(c.compensated_mm, 0.30);
+TEST_F(RealRobot, IsExplainedByGeometryAndComplianceAndCompensatedByABias) {
+  for (const char* name : {"c", "d"}) {
+    const Evaluation shown =
+        held_out(test::demand(train(test::ur10_cell(), series(name, 200), quick("M3", "matern52"))));
+    EXPECT_LE(to_mm(shown.nominal.rms), 1.05) << name;
+    EXPECT_LE(to_mm(shown.calibrated.rms), 0.52) << name;
+    EXPECT_LE(to_mm(shown.compensated.rms), 0.37) << name;
+  }
 }
 
 const char* const kJointMaps = "M3,joint_map:1,joint_map:2,joint_map:3,joint_map:4,joint_map:5,joint_map:6";
 
 TEST_F(RealRobot, JointMapsExplainMostOfWhatGeometryLeavesAndLastForMonths) {
-  const CompensatedModel c = test::demand(train(cell(), series("c"), quick(kJointMaps, "none")));
-  test::tell_figure("UR10 c joint maps, mm", to_mm(c.parts().validation->calibrated.rms));
-  EXPECT_LE(to_mm(c.parts().validation->calibrated.rms), 0.095);
+  const auto cell = test::ur10_cell();
+  const CompensatedModel c = test::demand(train(cell, series("c", 200), quick(kJointMaps, "none")));
+  EXPECT_LE(to_mm(held_out(c).calibrated.rms), 0.17);
   // The other series months later: base and tool from 60 of its poses (spread over it: it keeps one orientation for
   // dozens of poses), everything else from the first.
-  TrainOptions refit = quick(kJointMaps, "none");
-  refit.from = c;
-  const CompensatedModel d = test::demand(train(cell(), series("d", 60, 7), refit));
-  EXPECT_LE(to_mm(d.parts().validation->calibrated.rms), 0.45);
-  const CompensatedModel without = test::demand(train(cell(), series("c"), quick("M3", "none")));
-  refit.from = without;
-  const CompensatedModel d_without = test::demand(train(cell(), series("d", 60, 7), refit));
-  test::tell_figure("UR10 d from c, joint maps, mm", to_mm(d.parts().validation->calibrated.rms));
-  test::tell_figure("UR10 d from c, without maps, mm", to_mm(d_without.parts().validation->calibrated.rms));
-  EXPECT_LT(d.parts().validation->calibrated.rms, d_without.parts().validation->calibrated.rms);
+  const auto refitted = [&](const CompensatedModel& from) {
+    TrainOptions refit = quick("M3", "none");
+    refit.from = from;
+    return to_mm(held_out(test::demand(train(cell, test::ur10_series("d", 60, 7, 6), refit))).calibrated.rms);
+  };
+  const double with_maps = refitted(c);
+  EXPECT_LE(with_maps, 0.45);
+  EXPECT_LT(with_maps, refitted(test::demand(train(cell, series("c", 200), quick("M3", "none")))));
 }
 
-TEST_F(RealRobot, JointMapsLearnFromTwoHundredPoses) {
-  const CompensatedModel c = test::demand(train(cell(), series("c", 200), quick(kJointMaps, "se")));
-  test::tell_figure("UR10 c joint maps, 200 poses, mm", to_mm(c.parts().validation->calibrated.rms));
-  EXPECT_LE(to_mm(c.parts().validation->calibrated.rms), 0.155);
-  EXPECT_LE(to_mm(c.parts().validation->compensated.rms), 0.155) << "a process on top may not spoil it";
-}
-
-TEST_F(RealRobot, ABiasWithJointMapsAndParametersTakesUr10ToATenthOfAMillimetre) {
-  for (const char* name : {"c", "d"}) {
-    const auto model = train(cell(), series(name), quick("M3", "matern52 + joint_map + parameters"));
-    const Evaluation evaluation = *test::demand(model).parts().validation;
-    const auto tell = [&](const char* what, double value) {
-      test::tell_figure(fmt::format("UR10 {} coupled bias, {}", name, what), value);
-    };
-    tell("mm", to_mm(evaluation.compensated.rms));
-    tell("inside 95 %", 100 * evaluation.coverage_95);
-    EXPECT_LE(to_mm(evaluation.compensated.rms), 0.100) << name;
-    EXPECT_GE(evaluation.coverage_95, 0.90) << name;
-    const OrientationFigures& turned = evaluation.orientation.value();
-    tell("calibrated, deg", to_deg(turned.calibrated));
-    tell("deg", to_deg(turned.compensated));
-    tell("orientations inside 95 %", 100 * turned.coverage_95.value());
-    EXPECT_LE(turned.compensated, 0.4 * turned.calibrated) << name;
-    EXPECT_GE(turned.coverage_95.value(), 0.92) << name;
-  }
-}
-
-TEST_F(RealRobot, Ur10SeriesDIsExplainedAndCompensated) {
-  const Figures d = figures("d");
-  EXPECT_LE(d.nominal_mm, 0.80);
-  EXPECT_LE(d.geometry_mm, 0.42);
-  EXPECT_LE(d.compensated_mm, 0.30);
+TEST_F(RealRobot, ABiasWithJointMapsAndParametersHalvesWhatMaternLeavesAndKnowsItsOrientations) {
+  const Evaluation shown = held_out(
+      test::demand(train(test::ur10_cell(), series("c", 150), quick("M3", "matern52 + joint_map + parameters"))));
+  EXPECT_LE(to_mm(shown.compensated.rms), 0.5 * to_mm(shown.calibrated.rms));
+  EXPECT_GE(shown.coverage_95, 0.90);
+  const OrientationFigures& turned = shown.orientation.value();
+  EXPECT_LE(turned.compensated, 0.5 * turned.calibrated);
+  EXPECT_GE(turned.coverage_95.value(), 0.90);
 }
 
 }  // namespace
