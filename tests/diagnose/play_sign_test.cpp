@@ -107,8 +107,8 @@ TEST(PlaySign, ARealRobotWhoseDirectionsAreItsMovesIsNotToldToAdjustItsGears) {
                                                                                        : 0;
     last = &m.context.q;
   }
-  for (std::size_t i = 0; 18 * i < batch.measurements.size(); ++i) batch.measurements[i] = batch.measurements[18 * i];
-  batch.measurements.resize((batch.measurements.size() + 17) / 18);
+  for (std::size_t i = 0; 12 * i < batch.measurements.size(); ++i) batch.measurements[i] = batch.measurements[12 * i];
+  batch.measurements.resize((batch.measurements.size() + 11) / 12);
   const auto cell = std::make_shared<const Cell>(test::demand(read_cell(TRAMMEL_SOURCE_DIR "/config/ur10.yaml")));
   const Diagnosis real = test::demand(diagnose(cell, batch, quick()));
   for (const Finding& finding : real.findings) {

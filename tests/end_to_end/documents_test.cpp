@@ -70,8 +70,6 @@ const std::map<std::string, std::string>& not_typed() {
       {"trammel deflection ", "MeasurementCommands"},
       {"apt install", "deploy/try-packages"},
       {"cmake --build --preset release --target packages", "Debian.*"},
-      {"cmake --workflow", "Readme.*"},
-      {"deploy/dependencies", "installs on the machine"},
       {"promtool", "needs Prometheus"},
       {"tests/benchmarks/figures", "takes minutes; Figures.*"},
       {"tests/fuzz/run", "takes minutes; Fuzz.*"},
