@@ -39,7 +39,7 @@ class CoupledBias : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     robot_ = new VirtualRobot(test::chapter_5_robot(test::cell_7()));
-    model_ = new CompensatedModel(trained("M2", "se + joint_map + parameters", 120));
+    model_ = new CompensatedModel(trained("M2", "se + joint_map + parameters", 90));
   }
   static void TearDownTestSuite() {
     delete robot_;
@@ -85,7 +85,7 @@ TEST_F(CoupledBias, KeysOfBlocksAreWrittenWhereThereAreBlocksAndTheHashCoversThe
   const nlohmann::json plain = content_of(trained("M2", "se", 60));
   EXPECT_FALSE(plain.contains("poses"));
   EXPECT_FALSE(plain.contains("block_hyperparameters"));
-  EXPECT_EQ(content_of(*model_).at("poses").size(), 120u);
+  EXPECT_EQ(content_of(*model_).at("poses").size(), 90u);
 
   nlohmann::json file = nlohmann::json::parse(serialize(*model_));
   file["content"]["bias"]["poses"][3]["payload"] = "feather";
@@ -96,7 +96,7 @@ TEST_F(CoupledBias, KeysOfBlocksAreWrittenWhereThereAreBlocksAndTheHashCoversThe
             Refusal("cell.model", {}, "bias").text("spindle feather"));
   file["content"]["bias"].erase("poses");
   file["hash"] = sha256_hex(file["content"].dump());
-  EXPECT_EQ(refusal_of(deserialize(file.dump(), "cell.model")), Refusal("cell.model", {}, "bias").beyond(0, 120));
+  EXPECT_EQ(refusal_of(deserialize(file.dump(), "cell.model")), Refusal("cell.model", {}, "bias").beyond(0, 90));
 }
 
 TEST_F(CoupledBias, APoseDescribedAsNoRobotCanBeIsRefused) {

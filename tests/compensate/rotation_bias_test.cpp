@@ -44,7 +44,7 @@ class RotationBias : public testing::Test {
       const Eigen::Index first = add_source(robot_->truth, map);
       robot_->truth.values.segment(first, static_cast<Eigen::Index>(map->parameters().size())).setConstant(3e-4);
     }
-    batch_ = new MeasurementBatch(test::measured(*robot_, 200, 71));
+    batch_ = new MeasurementBatch(test::measured(*robot_, 130, 71));
     model_ = new CompensatedModel(trained(*batch_, "se + joint_map"));
   }
   static void TearDownTestSuite() {
