@@ -29,12 +29,9 @@ class Consumer {
   Consumer(const std::string& name, const std::vector<std::string>& definitions, const std::string& part)
       : folder_(fs::path(TRAMMEL_BINARY_DIR) / "tests" / "package" / name) {
     fs::remove_all(folder_);
-    std::vector<std::string> configure = {"/usr/bin/cmake",
-                                          "-GNinja",
-                                          "-S",
-                                          std::string(TRAMMEL_SOURCE_DIR) + "/tests/package/consumer",
-                                          "-B",
-                                          folder_.string()};
+    std::vector<std::string> configure = {
+        "/usr/bin/cmake", "-GNinja", "-S", std::string(TRAMMEL_SOURCE_DIR) + "/tests/package/consumer", "-B",
+        folder_.string()};
     configure.insert(configure.end(), definitions.begin(), definitions.end());
     run_to_its_end(configure);
     run_to_its_end({"/usr/bin/cmake", "--build", folder_.string(), "--target", part});
