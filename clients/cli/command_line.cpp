@@ -78,6 +78,7 @@ void add_commands(CLI::App& app, Action& chosen) {
   add_diagnose_command(app, chosen);
   add_backup_command(app, chosen);
   add_robot_command(app, chosen);
+  add_confirm_command(app, chosen);
   add_structure_commands(app, chosen);
   add_fleet_command(app, chosen);
   add_study_command(app, chosen);

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "server/base/hash.h"
 #include "server/base/name_check.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
@@ -13,6 +14,7 @@
 #include "server/robot/cell_row.h"
 #include "server/robot/cell_rules.h"
 #include "server/robot/gauge.h"
+#include "server/robot/robot_confirmation.h"
 
 namespace trammel {
 
@@ -154,7 +156,7 @@ void read_tools(const YamlMap& map, Cell& cell) {
     map.refuse("tools", refused("no tool").beyond(0, 1).next("name at least one, as null where its pose is unknown"));
 }
 
-constexpr double kHeaviest = 5000;  // kg; no robot carries more
+constexpr double kHeaviest = 2300;  // kg; no robot carries more
 
 void read_payloads(const YamlMap& map, Cell& cell) {
   if (map.is_null("payloads")) return;
@@ -328,17 +330,26 @@ CellPapers read_papers(const YamlMap& map) {
   return papers;
 }
 
+std::optional<RobotConfirmation> read_confirmation(const YamlMap& map) {
+  if (map.is_null("robot_confirmed")) return std::nullopt;
+  const YamlMap said = map.map("robot_confirmed");
+  said.only({"robot_sha256", "poses", "position_mm", "orientation_deg", "day"});
+  return RobotConfirmation{said.text("robot_sha256"), said.integer("poses", 0), said.number("position_mm"),
+                           said.number("orientation_deg"), said.text("day")};
+}
+
 Cell read_cell_map(const YamlMap& map) {
-  map.only({"version",      "cell",
-            "robot",        "base",
-            "gravity",      "tools",
-            "payloads",     "tracker",
-            "model",        "joint_ranges_deg",
-            "workspace_mm", "sessions",
-            "tolerance_mm", "step_limit_mm",
-            "prior",        "controller_compensates",
-            "anchors",      "serial_number",
-            "instrument",   "operator"});
+  map.only({"version",        "cell",
+            "robot",          "base",
+            "gravity",        "tools",
+            "payloads",       "tracker",
+            "model",          "joint_ranges_deg",
+            "workspace_mm",   "sessions",
+            "tolerance_mm",   "step_limit_mm",
+            "prior",          "controller_compensates",
+            "anchors",        "serial_number",
+            "instrument",     "operator",
+            "robot_confirmed"});
   Cell cell;
   map.attempt([&] {
     if (map.integer("version", 0) != 1)
@@ -358,6 +369,7 @@ Cell read_cell_map(const YamlMap& map) {
   map.attempt([&] { read_model(map, cell); });
   static_cast<void>(read_rules(map));
   static_cast<void>(read_papers(map));
+  map.attempt([&] { static_cast<void>(read_confirmation(map)); });
   return cell;
 }
 
@@ -391,6 +403,27 @@ int joint_index(const YamlMap& map, const std::string& key) {
 
 }  // namespace
 
+namespace {
+
+constexpr double kShortestArm = 0.05;  // m, all lengths of its links together; no robot is smaller
+
+/// Refuses an arm that no robot is as small as.
+void check_lengths(const YamlMap& map, const std::vector<Joint>& joints) {
+  double sum = 0;
+  bool rails = false;
+  for (const Joint& joint : joints) {
+    sum += std::abs(joint.link.a) + std::abs(joint.link.d);
+    rails = rails || joint.type == JointType::kPrismatic;
+  }
+  if (rails || joints.size() < 3 || sum >= kShortestArm) return;
+  map.refuse("joints", refused("all lengths of the links together are {:g} mm, expected {:g} or more", to_mm(sum),
+                               to_mm(kShortestArm))
+                           .beyond(to_mm(sum), to_mm(kShortestArm))
+                           .next("in metres? write them in mm"));
+}
+
+}  // namespace
+
 Result<Chain> parse_robot(const std::string& robot_yaml, const std::string& where) {
   return read_yaml(robot_yaml, where,
                    [&](const YamlMap& map) {
@@ -399,6 +432,7 @@ Result<Chain> parse_robot(const std::string& robot_yaml, const std::string& wher
                        map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
                      std::vector<Joint> joints;
                      for (const YamlMap& entry : map.maps("joints")) joints.push_back(read_joint(entry));
+                     map.attempt([&] { check_lengths(map, joints); });
                      std::vector<Coupling> couplings;
                      if (!map.is_null("coupling")) {
                        for (const YamlMap& entry : map.maps("coupling")) {
@@ -476,6 +510,13 @@ Result<CellRules> rules_of(const Cell& cell) {
 Result<CellPapers> papers_of(const Cell& cell) {
   if (cell.cell_yaml.empty()) return CellPapers{};
   return read_yaml(cell.cell_yaml, cell.name, [](const YamlMap& map) { return read_papers(map); });
+}
+
+std::optional<RobotConfirmation> confirmation_of(const Cell& cell) {
+  if (cell.cell_yaml.empty()) return std::nullopt;
+  const auto said = read_yaml(cell.cell_yaml, cell.name, [](const YamlMap& map) { return read_confirmation(map); });
+  if (!said || !*said || (*said)->robot_sha256 != sha256_hex(cell.robot_yaml)) return std::nullopt;
+  return *said;
 }
 
 Result<Anchors> anchors_of(const Cell& cell) {

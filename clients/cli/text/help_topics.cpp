@@ -130,6 +130,7 @@ constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
     {"export-robot",
      "  trammel export-robot --model cell.model -o robot.urdf\n"
      "  trammel export-robot --model cell.model -o robot.yaml --table robot.csv"},
+    {"confirm-robot", "  trammel confirm-robot --cell cell.yaml --poses shown.csv"},
     {"submit", "  trammel submit --cell cell-7 --batch batch.csv --watch"},
     {"retrain", "  trammel retrain --cell cell-7 --batch b1 --batch b2 --watch"},
     {"status", "  trammel status --port 17500 --json -"},

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/robot/cell.h"
+
+namespace trammel {
+
+/// Something in a cell file or robot file that may be read without an error and is hardly meant so.
+struct CellDoubt {
+  std::string code;  ///< `gravity_up`, `quaternion_order`, `lengths_in_metres`, `hayati_missing`
+  std::string text;  ///< one sentence, with the key and the value
+};
+
+/// What is doubtful in the files, before any measurement: gravity that points up over an upright base; a quaternion
+/// that would put the base upright in the order x, y, z, w; a tool, a payload's centre or a base that is less than 2 mm
+/// away, as numbers in metres are; two consecutive parallel axes without `hayati: true`, whose d nobody can tell apart
+/// (Hayati, 1983).
+[[nodiscard]] std::vector<CellDoubt> doubts_of(const Cell& cell);
+
+}  // namespace trammel
