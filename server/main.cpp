@@ -12,13 +12,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <thread>
-#include <utility>
 #include <vector>
 
 #include "server/base/line_output.h"
 #include "server/base/memory.h"
-#include "server/base/mutex.h"
 #include "server/base/plain_text.h"
 #include "server/config/reload.h"
 #include "server/config/server_config.h"
@@ -26,6 +23,7 @@
 #include "server/dds/dds_service.h"
 #include "server/dds/port_lock.h"
 #include "server/dds/watchdog.h"
+#include "server/host/caught_signals.h"
 #include "server/host/log.h"
 #include "server/host/service_manager.h"
 #include "server/http/http_server.h"
@@ -147,71 +145,6 @@ void log_call(const CallReport& call) {
   }
 }
 
-/// Takes the signals that end the service or have it read its files again, in a thread of its own; all other threads
-/// block them. A signal to end ends the process within kOrderlyStop, even if another thread hangs.
-class Signals {
- public:
-  Signals() {
-    ::sigemptyset(&signals_);
-    for (const int number : {SIGTERM, SIGINT, SIGHUP}) ::sigaddset(&signals_, number);
-    ::pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
-    thread_ = std::jthread([this](const std::stop_token& over) { take(over); });
-  }
-  ~Signals() {
-    thread_.request_stop();
-    ::pthread_kill(thread_.native_handle(), SIGTERM);
-  }
-  Signals(const Signals&) = delete;
-  Signals& operator=(const Signals&) = delete;
-
-  struct News {
-    int ends = 0;  ///< the signal that ends the service; 0: none
-    bool reload = false;
-  };
-  /// Waits for a signal, `limit` at most.
-  [[nodiscard]] News wait(std::chrono::milliseconds limit) {
-    MutexLock lock(mutex_);
-    came_.wait_for(lock, std::stop_token(), limit,
-                   [this]() TRAMMEL_REQUIRES(mutex_) { return news_.ends != 0 || news_.reload; });
-    return std::exchange(news_, {});
-  }
-
- private:
-  static constexpr std::chrono::milliseconds kOrderlyStop{10'000};
-  static constexpr std::chrono::milliseconds kTick{250};
-
-  void take(const std::stop_token& over) {
-    ::pthread_setname_np(::pthread_self(), "signals");
-    int number = SIGHUP;
-    while (number == SIGHUP) {
-      while (::sigwait(&signals_, &number) != 0) continue;
-      if (over.stop_requested()) return;
-      {
-        const MutexLock lock(mutex_);
-        if (number == SIGHUP) {
-          news_.reload = true;
-        } else {
-          news_.ends = number;
-        }
-      }
-      came_.notify_all();
-    }
-    // Counts ticks, not time: the process may be paused meanwhile, and that is no hang.
-    const timespec tick{0, std::chrono::nanoseconds(kTick).count()};
-    for (auto waited = kTick; waited <= kOrderlyStop; waited += kTick) {
-      ::sigtimedwait(&signals_, nullptr, &tick);
-      if (over.stop_requested()) return;
-    }
-    end_at_once("trammeld: hangs: was asked to stop and has not stopped after 10 s; ends at once\n");
-  }
-
-  sigset_t signals_;
-  Mutex mutex_;
-  Condition came_;
-  News news_ TRAMMEL_GUARDED_BY(mutex_);
-  std::jthread thread_;
-};
-
 /// What would end the process though it can go on: a pipe that nobody reads any more, a file that may grow no further.
 /// Both are errors of the call that met them. The processes that compute get the signals as they were.
 void ignore_what_calls_report() {
@@ -263,14 +196,14 @@ struct Serving {
 };
 
 /// Gives signs of life, and reads files again, until a signal ends it; returns that.
-int watch(Signals& signals, const Serving& serving) {
+int watch(CaughtSignals& signals, const Serving& serving) {
   using std::chrono::milliseconds;
   constexpr milliseconds kTick{1000};
   const auto period = manager_watches_every();
   const milliseconds tick = period ? std::min(kTick, std::chrono::duration_cast<milliseconds>(*period) / 3) : kTick;
   std::string told;
   for (;;) {
-    const Signals::News news = signals.wait(tick);
+    const CaughtSignals::News news = signals.wait(tick);
     if (news.ends != 0) return news.ends;
     if (news.reload) reload(serving.arguments, serving.config, serving.service, serving.trainer);
     if (serving.service.movement().still.empty()) tell_manager_alive();
@@ -281,9 +214,11 @@ int watch(Signals& signals, const Serving& serving) {
   }
 }
 
+void hangs() { end_at_once("trammeld: hangs: was asked to stop and has not stopped after 10 s; ends at once\n"); }
+
 /// Serves until a signal ends it.
 Status serve(ServerConfig config, const Arguments& arguments) {
-  Signals signals;  // before any thread starts
+  CaughtSignals signals(hangs);  // before any thread of ours starts
   auto store = Store::open(config.store);
   if (!store) return tl::make_unexpected(store.error());
   ModelRegistry registry(config.models_in_memory);

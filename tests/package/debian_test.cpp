@@ -148,6 +148,38 @@ TEST_F(Debian, LintianFindsNoError) {
   EXPECT_EQ(found.exit_code, 0) << found.out << found.err;
 }
 
+void put_everywhere(std::string& text, const std::string& what, const std::string& by) {
+  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + by.size()))
+    text.replace(at, what.size(), by);
+}
+
+/// What the unit runs before it starts, as /bin/sh gets it, with the programs of `root` and this server file.
+std::string start_check(const test::TemporaryFolder& root, const std::string& server_file) {
+  const std::string unit = test::read_file(root.file("lib/systemd/system/trammeld.service"));
+  std::smatch found;
+  EXPECT_TRUE(std::regex_search(unit, found, std::regex("ExecStartPre=/bin/sh -c '(.*)'"))) << unit;
+  std::string command = found[1];
+  put_everywhere(command, "/usr/bin/trammeld", root.path().string() + "/usr/bin/trammeld");
+  put_everywhere(command, "/etc/trammel/server.yaml", server_file);
+  put_everywhere(command, "$$", "$");
+  return command;
+}
+
+TEST_F(Debian, AMisspeltKeyEndsTheStartAtOnceWithItsLine) {
+  const test::TemporaryFolder root;
+  ASSERT_EQ(test::run({"/usr/bin/dpkg-deb", "-x", package("trammeld"), root.path().string()}, kLimit).exit_code, 0);
+  const std::string start =
+      "version: 1\nserver: checked\ncells: [" + std::string(TRAMMEL_SOURCE_DIR) + "/config/cell-7.yaml]\n";
+  const auto checked = [&](const std::string& text) {
+    return test::run({"/bin/sh", "-c", start_check(root, root.write("server.yaml", text))}, kLimit);
+  };
+  const test::Finished wrong = checked(start + "store: trammel.db\ndds: {prot: 17555}\n");
+  EXPECT_NE(wrong.exit_code, 0);
+  EXPECT_NE(wrong.err.find("server.yaml row 5"), std::string::npos) << wrong.err;
+  EXPECT_NE(wrong.err.find("prot"), std::string::npos) << wrong.err;
+  EXPECT_EQ(checked(start + "store: " + root.file("trammel.db") + "\n").exit_code, 0);
+}
+
 TEST_F(Debian, SystemdTakesTheUnitsAndFindsThemHardlyExposed) {
   if (!is_here("systemd-analyze")) GTEST_SKIP() << "no systemd-analyze here";
   const test::TemporaryFolder root;
@@ -162,10 +194,7 @@ TEST_F(Debian, SystemdTakesTheUnitsAndFindsThemHardlyExposed) {
   for (const std::string name : {"trammeld.service", "trammel-discovery@.service"}) {
     const std::string unit = root.file("lib/systemd/system/" + name);
     std::string text = test::read_file(unit);
-    for (const auto& [installed, present] : programs) {
-      const std::size_t at = text.find(installed);
-      if (at != std::string::npos) text.replace(at, installed.size(), present);
-    }
+    for (const auto& [installed, present] : programs) put_everywhere(text, installed, present);
     const test::Finished verified =
         test::run({"/usr/bin/systemd-analyze", "verify", "--man=no", root.write(name, text)}, kLimit);
     EXPECT_EQ(verified.exit_code, 0) << name << ": " << verified.err;

@@ -17,6 +17,7 @@
 #include <csignal>
 #include <cstring>
 #include <fstream>
+#include <string_view>
 #include <utility>
 
 namespace trammel {
@@ -88,10 +89,22 @@ class SpawnPlan {
     std::vector<char*> arguments;
     for (const std::string& argument : argv) arguments.push_back(const_cast<char*>(argument.c_str()));
     arguments.push_back(nullptr);
-    return ::posix_spawn(&pid, arguments[0], &actions_, &attributes_, arguments.data(), environ);
+    std::vector<char*> environment = environment_of_child();
+    return ::posix_spawn(&pid, arguments[0], &actions_, &attributes_, arguments.data(), environment.data());
   }
 
  private:
+  /// Ours, and one thread for linear algebra: OpenBLAS starts one for each processor otherwise, as soon as it is
+  /// loaded.
+  static std::vector<char*> environment_of_child() {
+    static std::string one_thread = "OPENBLAS_NUM_THREADS=1";
+    std::vector<char*> all = {one_thread.data()};
+    for (char** entry = environ; *entry != nullptr; ++entry)
+      if (!std::string_view(*entry).starts_with("OPENBLAS_NUM_THREADS=")) all.push_back(*entry);
+    all.push_back(nullptr);
+    return all;
+  }
+
   posix_spawn_file_actions_t actions_{};
   posix_spawnattr_t attributes_{};
 };

@@ -1,0 +1,17 @@
+/* A library that starts a thread when it is loaded, as OpenBLAS does. The thread blocks no signal. */
+#include <pthread.h>
+#include <signal.h>
+#include <unistd.h>
+
+static void* idle(void* nothing) {
+  sigset_t none;
+  sigemptyset(&none);
+  pthread_sigmask(SIG_SETMASK, &none, NULL);
+  for (;;) pause();
+  return nothing;
+}
+
+__attribute__((constructor)) static void start(void) {
+  pthread_t thread;
+  pthread_create(&thread, NULL, idle, NULL);
+}
