@@ -7,16 +7,20 @@
 #include "server/compensate/paired_gain.h"
 #include "server/compensate/session_changes.h"
 #include "server/error_sources/anchors.h"
+#include "server/error_sources/shipped_causes.h"
+#include "server/robot/cell_doubts.h"
+#include "server/robot/robot_confirmation.h"
 
 namespace trammel {
 
 namespace {
 
-constexpr double kNothing = 1e-9;      // m, rad: a parameter whose prior moves the tool by less has no effect
-constexpr double kFarFromDrawing = 5;  // standard deviations of the prior
-constexpr double kElsewhere = 1e-3;    // m: a tool that moved by more turns through other errors of the arm
-constexpr double kSameRms = 1e-9;      // relative
-constexpr int kAskedPoses = 5;         // enough that each source acts at one of them
+using Severity = Note::Severity;
+
+constexpr double kNothing = 1e-9;    // m, rad: a parameter whose prior moves the tool by less has no effect
+constexpr double kElsewhere = 1e-3;  // m: a tool that moved by more turns through other errors of the arm
+constexpr double kSameRms = 1e-9;    // relative
+constexpr int kAskedPoses = 5;       // enough that each source acts at one of them
 constexpr const char* kAsWithout = "so the model is what it would be without it";
 constexpr int kAfterEverything = 1 << 20;  // index of a pose after any batch: all that begins at a pose has begun
 
@@ -87,12 +91,13 @@ std::string what_would_give_way() {
 }
 
 /// What training added by itself.
-void add_what_data_added(const CompensatedModel::Parts& parts, std::vector<std::string>& notes) {
+void add_what_data_added(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   for (const ErrorSourcePtr& source : parts.physics.sources) {
     const auto& added = source->cause().added_by_data;
     // One session shows no warmth that training adds.
     if (source->cause().needs.temperature && parts.sessions.empty()) continue;
-    if (added && !added->is_known(*parts.physics.cell)) notes.emplace_back(added->note);
+    if (added && !added->is_known(*parts.physics.cell))
+      notes.push_back({"added_by_data", Severity::kInfo, std::string(added->note)});
   }
 }
 
@@ -110,42 +115,107 @@ std::string idle_sentence(const CompensatedModel::Parts& parts, const ErrorSourc
   return fmt::format("{} does nothing here: at these poses it has nothing to act on", name);
 }
 
-void add_idle_sources(const CompensatedModel::Parts& parts, std::vector<std::string>& notes) {
+void add_idle_sources(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   if (parts.physics.parameter_count() == 0 || parts.trained_with.empty()) return;
   const Eigen::VectorXd effect = effects(parts);
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : parts.physics.sources) {
     const auto count = static_cast<Eigen::Index>(source->parameters().size());
     if (count > 0 && !is_of_instruments(*source) && effect.segment(first, count).maxCoeff() < kNothing)
-      notes.push_back(idle_sentence(parts, *source));
+      notes.push_back({"idle_source", Severity::kInfo, idle_sentence(parts, *source)});
     first += count;
   }
 }
 
-/// What no arm is off its drawing by: something else than the arm is not as the files have it.
-void add_far_parameters(const CompensatedModel::Parts& parts, std::vector<std::string>& notes) {
-  std::string far;
+/// How far a number of a robot may be off its drawing, SI, and how people read it.
+struct Drawing {
+  const char* symbol;
+  double limit;
+  const char* unit;
+  double per_si;
+};
+const Drawing kDrawing[] = {{"q", from_deg(1), "deg", to_deg(1)},
+                            {"d", from_mm(3), "mm", to_mm(1)},
+                            {"a", from_mm(3), "mm", to_mm(1)},
+                            {"alpha", 3e-3, "mrad", 1e3},
+                            {"beta", 3e-3, "mrad", 1e3}};
+
+/// The kind of `d4`; none of `theta7` (of a rail, which stands as it was mounted) or `C2`.
+const Drawing* drawing_of(const std::string& name) {
+  const std::size_t digits = name.find_first_of("0123456789");
+  if (digits == std::string::npos || name.find_first_not_of("0123456789", digits) != std::string::npos) return nullptr;
+  const std::string_view symbol = std::string_view(name).substr(0, digits);
+  for (const Drawing& one : kDrawing)
+    if (symbol == one.symbol) return &one;
+  return nullptr;
+}
+
+/// Of an error source of the arm: its parameters that are farther off than a robot may be by more than their
+/// uncertainty.
+std::string off_drawing(const CompensatedModel::Parts& parts) {
+  std::string off;
   std::size_t first = 0;
   for (const ErrorSourcePtr& source : parts.physics.sources) {
     const std::size_t count = source->parameters().size();
-    for (std::size_t i = first; i < first + count && source->cause().scope == causes::Scope::kArm; ++i) {
+    for (std::size_t i = first; i < first + count && &source->cause() == &causes::geometry(); ++i) {
       const IdentifiedParameter& one = parts.parameters[i];
-      const Parameter& parameter = one.parameter;
-      if (!one.identified || std::abs(one.value - parameter.prior) < kFarFromDrawing * parameter.prior_scale) continue;
-      far += fmt::format("{}{} {:.4g} {}", far.empty() ? "" : ", ", parameter.name, parameter.scale * one.value,
-                         parameter.unit);
+      const Drawing* drawing = drawing_of(one.parameter.name);
+      if (drawing == nullptr || std::abs(one.value) - 2 * one.stddev <= drawing->limit) continue;
+      off += fmt::format("{}{} by {:.3g} {} (limit {:.3g})", off.empty() ? "" : ", ", one.parameter.name,
+                         drawing->per_si * one.value, drawing->unit, drawing->per_si * drawing->limit);
     }
     first += count;
   }
-  if (far.empty()) return;
-  notes.push_back(
-      fmt::format("no arm is usually so far from its drawing: {}; is it this robot's file, and is the tool in the cell "
-                  "file the one "
-                  "that was measured (null in its place finds it)?",
-                  far));
+  return off;
 }
 
-void add_moved_tools(const CompensatedModel& model, std::vector<std::string>& notes) {
+/// A model of the wrong robot file fits positions and is of no use for corrected poses.
+void add_off_drawing(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
+  const std::string off = off_drawing(parts);
+  if (off.empty()) return;
+  notes.push_back(
+      {"robot_off_drawing", Severity::kStop,
+       fmt::format(
+           "no robot is so far off its drawing: {}; is it this robot's file, and is the tool in the cell file the one "
+           "that was measured (null in its place finds it)? Where the file is not the controller's, corrected poses "
+           "land off by the difference, since the controller solves them with its own arm: compare them (trammel "
+           "confirm-robot)",
+           off)});
+}
+
+void add_confirmation(const Cell& cell, std::vector<Note>& notes) {
+  if (confirmation_of(cell)) return;
+  notes.push_back({kNotConfirmed, Severity::kInfo,
+                   "nobody has compared the robot file with the controller (trammel confirm-robot): where a length in "
+                   "it is not the "
+                   "controller's, corrected poses land off by the difference"});
+}
+
+/// What is left of poses held out, where enough were, else of the training's. It stops where it is gross in both: a few
+/// bad poses that were held out do not speak against a model.
+void add_left_over(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
+  constexpr int kEnough = 10;                // poses
+  constexpr double kLeads = 3, kStops = 30;  // times the stated sigma
+  const bool held_out = parts.validation && parts.validation->poses >= kEnough;
+  const Evaluation& left = held_out ? *parts.validation : parts.training;
+  const double sigma = parts.physics.cell->tracker.sigma;
+  const double noise = std::sqrt(3.0) * sigma;
+  const double times = left.compensated.rms / noise;
+  if (left.poses == 0 || !(times >= kLeads)) return;
+  const bool stops = std::min(times, parts.training.compensated.rms / noise) >= kStops;
+  notes.push_back(
+      {"left_over_sigma", stops ? Severity::kStop : Severity::kWarning,
+       fmt::format("the model leaves {:.3f} mm rms at {} poses{}, {:.0f} times what the instrument's sigma "
+                   "of {:.4g} mm explains: something is in the data that the model does not know (trammel "
+                   "diagnose)",
+                   to_mm(left.compensated.rms), left.poses, held_out ? " held out" : "", times, to_mm(sigma))});
+}
+
+void add_cell_doubts(const Cell& cell, std::vector<Note>& notes) {
+  for (const CellDoubt& doubt : doubts_of(cell)) notes.push_back({doubt.code, Severity::kWarning, doubt.text});
+}
+
+void add_moved_tools(const CompensatedModel& model, std::vector<Note>& notes) {
   const CompensatedModel::Parts& parts = model.parts();
   if (!parts.bias_origin) return;
   const PhysicalModel& then = parts.bias_origin->physics;
@@ -153,33 +223,39 @@ void add_moved_tools(const CompensatedModel& model, std::vector<std::string>& no
     const double moved =
         (served_tool(parts.physics, name).translation() - served_tool(then, name).translation()).norm();
     if (moved < kElsewhere) continue;
-    notes.push_back(fmt::format(
-        "the bias was learned with tool '{}' {:.1f} mm from where it is now: its kernel does not follow what turns the "
-        "flange to the new point; learn it anew (--bias) where that matters",
-        name, to_mm(moved)));
+    notes.push_back({"tool_moved", Severity::kInfo,
+                     fmt::format("the bias was learned with tool '{}' {:.1f} mm from where it is now: its kernel does "
+                                 "not follow what turns the "
+                                 "flange to the new point; learn it anew (--bias) where that matters",
+                                 name, to_mm(moved))});
   }
 }
 
-void add_changes(const CompensatedModel& model, std::vector<std::string>& notes) {
-  for (const SessionChange& change : session_changes(model)) notes.push_back(sentence(change));
+void add_changes(const CompensatedModel& model, std::vector<Note>& notes) {
+  for (const SessionChange& change : session_changes(model))
+    notes.push_back({"changed_between_sessions", Severity::kInfo, sentence(change)});
   if (const auto order = note_on_order(model.parts().sessions, model.parts().sessions_as_given))
-    notes.push_back(*order);
+    notes.push_back({"order_of_sessions", Severity::kInfo, *order});
 }
 
-void add_sessions(const CompensatedModel::Parts& parts, std::vector<std::string>& notes) {
+void add_sessions(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   for (const LeftOutSession& session : parts.sessions_left_out)
-    notes.push_back(fmt::format("nothing was learned from session {}: {}", session.id, session.why));
+    notes.push_back({"session_left_out", Severity::kWarning,
+                     fmt::format("nothing was learned from session {}: {}", session.id, session.why)});
   for (const SessionSetting& session : parts.sessions) {
     if (session.scale != 0) {
-      notes.push_back(fmt::format(
-          "session {} measured lengths {:.1f} ppm {} than session {}: it has a scale of its own", session.id,
-          1e6 * std::abs(session.scale), session.scale < 0 ? "longer" : "shorter", parts.sessions.back().id));
+      notes.push_back(
+          {"session_scale", Severity::kInfo,
+           fmt::format("session {} measured lengths {:.1f} ppm {} than session {}: it has a scale of its own",
+                       session.id, 1e6 * std::abs(session.scale), session.scale < 0 ? "longer" : "shorter",
+                       parts.sessions.back().id)});
     }
     if (session.own_noise == 0 && session.own_noise_rotation == 0) continue;
     notes.push_back(
-        fmt::format("session {} is noisier than the others, by {:.4f} mm and {:.4f} deg an axis: it counts "
-                    "for less",
-                    session.id, to_mm(session.own_noise), to_deg(session.own_noise_rotation)));
+        {"session_noisier", Severity::kInfo,
+         fmt::format("session {} is noisier than the others, by {:.4f} mm and {:.4f} deg an axis: it counts "
+                     "for less",
+                     session.id, to_mm(session.own_noise), to_deg(session.own_noise_rotation))});
   }
 }
 
@@ -190,36 +266,47 @@ long measured_numbers(const Evaluation& training) {
 }
 
 /// A fit of r combinations to n numbers leaves sqrt(1 - r/n) of their rms: below n = 2 r more than a third is hidden.
-void add_too_few_poses(const CompensatedModel::Parts& parts, std::vector<std::string>& notes) {
+void add_too_few_poses(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   const long numbers = measured_numbers(parts.training);
   if (!parts.provenance.refits.empty() || parts.training.poses == 0 || numbers >= 2L * parts.rank) return;
   const double each = static_cast<double>(numbers) / parts.training.poses;
   const double enough = std::ceil(2.0 * static_cast<double>(parts.parameters.size()) / each);
-  notes.push_back(fmt::format(
-      "{} combinations of parameters were fitted to {} measured numbers of {} poses: what is left at these poses is "
-      "small by that alone and does not tell how well others are met; train on {:.0f} poses or more",
-      parts.rank, numbers, parts.training.poses, enough));
+  notes.push_back(
+      {"too_few_poses", Severity::kWarning,
+       fmt::format("{} combinations of parameters were fitted to {} measured numbers of {} poses: what is left at "
+                   "these poses is "
+                   "small by that alone and does not tell how well others are met; train on {:.0f} poses or more",
+                   parts.rank, numbers, parts.training.poses, enough)});
 }
 
 }  // namespace
 
-std::vector<std::string> notes_of(const CompensatedModel& model) {
-  std::vector<std::string> notes;
+std::vector<Note> notes_of(const CompensatedModel& model) {
+  std::vector<Note> notes;
   add_too_few_poses(model.parts(), notes);
   add_changes(model, notes);
   add_sessions(model.parts(), notes);
   add_what_data_added(model.parts(), notes);
   add_idle_sources(model.parts(), notes);
-  add_far_parameters(model.parts(), notes);
+  add_off_drawing(model.parts(), notes);
+  add_left_over(model.parts(), notes);
+  add_cell_doubts(model.cell(), notes);
   add_moved_tools(model, notes);
-  return notes;
+  add_confirmation(model.cell(), notes);
+  return gravest_first(std::move(notes));
 }
 
-std::vector<std::string> warnings_of(const CompensatedModel& model, const std::optional<Evaluation>& evaluation) {
-  std::vector<std::string> all = notes_of(model);
+std::optional<Note> stop_of(const CompensatedModel& model) {
+  std::vector<Note> notes = notes_of(model);
+  if (notes.empty() || notes.front().severity != Severity::kStop) return std::nullopt;
+  return std::move(notes.front());
+}
+
+std::vector<Note> warnings_of(const CompensatedModel& model, const std::optional<Evaluation>& evaluation) {
+  std::vector<Note> all = notes_of(model);
   const std::optional<std::string> doubt = evaluation ? doubt_of_bias(*evaluation) : std::nullopt;
-  if (doubt) all.push_back(*doubt);
-  return all;
+  if (doubt) all.push_back({"bias_doubtful", Severity::kWarning, *doubt});
+  return gravest_first(std::move(all));
 }
 
 std::optional<std::string> doubt_of_bias(const Evaluation& evaluation) {

@@ -57,7 +57,8 @@ ordered_json moved_json(const Moved& one) {
 
 void put_on_record(const CompensatedModel& model, VersionOnRecord& version) {
   const CompensatedModel::Parts& parts = model.parts();
-  version.notes = notes_of(model);
+  version.notes.clear();
+  for (const Note& note : notes_of(model)) version.notes.push_back(note.text);
   version.papers = papers_of(model.cell()).value_or(CellPapers());
   version.parameters.clear();
   std::size_t next = 0;

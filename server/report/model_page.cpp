@@ -87,7 +87,8 @@ std::string tiles(const Evaluation& evaluation) {
 
 std::string warnings(const CompensatedModel& model, const Evaluation& evaluation) {
   std::string html;
-  for (std::string one : warnings_of(model, evaluation)) {
+  for (const Note& note : warnings_of(model, evaluation)) {
+    std::string one = note.text;
     one.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(one.front())));
     html += "<p class=\"warning\">" + html_text(one) + ".</p>\n";
   }

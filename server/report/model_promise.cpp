@@ -5,6 +5,7 @@
 
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
+#include "server/compensate/model_notes.h"
 #include "server/health/health_check.h"
 #include "server/measurement/pose_columns.h"
 #include "server/measurement/repeats.h"
@@ -12,6 +13,7 @@
 #include "server/report/page_parts.h"
 #include "server/robot/cell_papers.h"
 #include "server/robot/cell_rules.h"
+#include "server/robot/robot_confirmation.h"
 
 namespace trammel {
 
@@ -96,6 +98,11 @@ std::string papers_table(const CompensatedModel& model, const std::optional<Posi
   add("robot", model.cell().robot.name());
   add("serial number", or_not_told(papers.serial_number));
   add("cell", model.cell().name);
+  const auto confirmed = confirmation_of(model.cell());
+  add("robot file",
+      confirmed ? fmt::format("compared with {} poses of the controller on {}: {:.3f} mm and {:.3f} deg at the most",
+                              confirmed->poses, confirmed->day, confirmed->position_mm, confirmed->orientation_deg)
+                : std::string("not compared with the controller (trammel confirm-robot)"));
   add("tool", tools(model.parts()));
   add("instrument", fmt::format("{}; {:.4g} mm (1 sigma, per axis) as stated", or_not_told(papers.instrument), sigma));
   add("operator", or_not_told(papers.operator_name));
@@ -209,6 +216,7 @@ std::optional<std::string> why_no_promise(const CompensatedModel& model,
     if (const auto foreign = foreign_poses(model, *batch))
       return "Nothing can be promised by these measurements: " + *foreign;
   }
+  if (const auto stop = stop_of(model)) return "Nothing is promised of corrected poses: " + stop->text + ".";
   if (!accuracy || freedom_left(model, *accuracy) >= kFewestFreedom) return std::nullopt;
   const int poses = model.provenance().training_poses;
   return fmt::format(

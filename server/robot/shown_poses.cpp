@@ -273,8 +273,8 @@ std::vector<std::pair<std::string, Chain>> other_senses(const Chain& robot) {
   std::vector<std::pair<std::string, Chain>> all;
   const std::vector<Joint> joints = joints_of(robot);
   const std::vector<Coupling> couplings = couplings_of(robot);
-  const auto add = [&](std::string text, std::vector<Joint> of, std::vector<Coupling> couplings) {
-    if (auto chain = Chain::make(robot.name(), std::move(of), std::move(couplings)))
+  const auto add = [&](std::string text, std::vector<Joint> of, std::vector<Coupling> with) {
+    if (auto chain = Chain::make(robot.name(), std::move(of), std::move(with)))
       all.emplace_back(std::move(text), *chain);
   };
   for (int j = 0; j < robot.size(); ++j) {

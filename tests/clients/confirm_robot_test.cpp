@@ -95,7 +95,8 @@ class EveryMakersAngles : public testing::TestWithParam<std::tuple<std::string, 
 TEST_P(EveryMakersAngles, AreReadAsTheyAreMeant) {
   const auto& [robot, angles, header] = GetParam();
   const Cell cell = cell_with(robot);
-  const RobotComparison found = compared(cell, screen({cell.robot, angles, {}, {}, header}));
+  const RobotComparison found =
+      compared(cell, screen({cell.robot, angles, Pose::Identity(), Pose::Identity(), header}));
   EXPECT_EQ(found.verdict, Verdict::kConfirmed) << found.why;
   EXPECT_LT(found.position_max, 0.1e-3);
   EXPECT_LT(found.rotation_max, from_deg(0.02));
@@ -144,8 +145,8 @@ TEST(ConfirmRobot, AnotherRobotOfTheFamilyIsNotTheFilesOne) {
   other = altered(other, 3, &LinkGeometry::d, 0.02415);
   other = altered(other, 4, &LinkGeometry::d, 0.00505);
   other = altered(other, 5, &LinkGeometry::d, 0.0173);
-  const RobotComparison found =
-      compared(cell, screen({other, Angles::kUniversalRobots, {}, {}, "J1,J2,J3,J4,J5,J6,X,Y,Z,Rx,Ry,Rz"}));
+  const RobotComparison found = compared(cell, screen({other, Angles::kUniversalRobots, Pose::Identity(),
+                                                       Pose::Identity(), "J1,J2,J3,J4,J5,J6,X,Y,Z,Rx,Ry,Rz"}));
   EXPECT_EQ(found.verdict, Verdict::kDiffers) << found.why;
   EXPECT_EQ(found.could_be.size(), 4U) << fmt::format("{}", fmt::join(found.could_be, "; "));
 }

@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <tuple>
 
+#include "server/base/units.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 
@@ -25,47 +28,88 @@ CompensatedModel model_of(const std::vector<std::string>& sources, const std::ma
   return test::demand(CompensatedModel::make(std::move(parts)));
 }
 
+/// What is noted beside a robot file that nobody has confirmed, as it is of every cell here.
+std::vector<std::string> noted(const CompensatedModel& model) {
+  std::vector<std::string> texts;
+  for (const Note& note : notes_of(model))
+    if (note.code != kNotConfirmed) texts.push_back(note.text);
+  return texts;
+}
+
 const std::map<std::string, Payload> kHeavy = {{"spindle", {100, Vector3(0, 0, 0.1)}}};
 const std::map<std::string, Payload> kWeightless = {{"spindle", {0, Vector3(0, 0, 0.1)}}};
 
 TEST(ModelNotes, ComplianceWithoutALoadIsSaidToBeNothing) {
   for (const auto& payloads : {std::map<std::string, Payload>{}, kWeightless}) {
     for (const char* form : {"compliance_linear", "compliance_first_order", "compliance_equilibrium"}) {
-      const std::vector<std::string> notes = notes_of(model_of({"base", "geometry", form}, payloads));
+      const std::vector<std::string> notes = noted(model_of({"base", "geometry", form}, payloads));
       ASSERT_EQ(notes.size(), 1U) << form;
       EXPECT_EQ(notes.front(),
                 "gearbox compliance does nothing here: neither link masses nor a payload with a mass are given, so M3 "
                 "is M2; give payloads: {NAME: {mass_kg: ..., cog_mm: [x, y, z]}} in the cell file");
     }
   }
-  EXPECT_TRUE(notes_of(model_of({"base", "geometry", "compliance_linear"}, kHeavy)).empty());
+  EXPECT_TRUE(noted(model_of({"base", "geometry", "compliance_linear"}, kHeavy)).empty());
 }
 
 TEST(ModelNotes, EverySourceThatHasNothingToActOnIsNamed) {
-  const std::vector<std::string> idle = notes_of(model_of({"base", "link_bending:2"}, kWeightless));
+  const std::vector<std::string> idle = noted(model_of({"base", "link_bending:2"}, kWeightless));
   ASSERT_EQ(idle.size(), 1U);
   EXPECT_TRUE(idle.front().starts_with("bending of link 2 does nothing here: neither link masses nor a payload"))
       << idle[0];
-  const std::vector<std::string> stiff = notes_of(model_of({"base", "geometry", "payload"}, kHeavy));
+  const std::vector<std::string> stiff = noted(model_of({"base", "geometry", "payload"}, kHeavy));
   ASSERT_EQ(stiff.size(), 1U);
   EXPECT_TRUE(
       stiff.front().starts_with("payload mass or centre of gravity does nothing here: nothing gives way under a load"))
       << stiff[0];
 }
 
-TEST(ModelNotes, LengthsThatNoArmIsOffItsDrawingByAskForTheTool) {
+/// With one number of the arm off by `value` (SI), known to `stddev`.
+CompensatedModel off_by(const std::string& name, double value, double stddev = 0) {
   CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
-  const auto a6 = std::find_if(parts.parameters.begin(), parts.parameters.end(),
-                               [](const auto& one) { return one.parameter.name == "a6"; });
-  ASSERT_NE(a6, parts.parameters.end());
-  a6->value = 4 * a6->parameter.prior_scale;
-  EXPECT_TRUE(notes_of(test::demand(CompensatedModel::make(parts))).empty());
-  a6->value = -10e-3;
-  const std::vector<std::string> notes = notes_of(test::demand(CompensatedModel::make(parts)));
-  ASSERT_EQ(notes.size(), 1U);
-  EXPECT_TRUE(notes.front().starts_with("no arm is usually so far from its drawing: a6 -10 mm; is it")) << notes[0];
-  a6->identified = false;
-  EXPECT_TRUE(notes_of(test::demand(CompensatedModel::make(parts))).empty());
+  for (IdentifiedParameter& one : parts.parameters) {
+    if (one.parameter.name != name) continue;
+    one.value = value;
+    one.stddev = stddev;
+  }
+  return test::demand(CompensatedModel::make(parts));
+}
+
+TEST(ModelNotes, WhatNoRobotIsOffItsDrawingByWaitsForAPerson) {
+  for (const auto& [name, within, beyond] :
+       {std::tuple("a6", 2.9e-3, -3.1e-3), std::tuple("d4", -2.9e-3, 20e-3), std::tuple("alpha2", 2.9e-3, 3.1e-3),
+        std::tuple("beta2", 2.9e-3, -3.1e-3), std::tuple("q5", from_deg(0.9), from_deg(-1.1))}) {
+    EXPECT_FALSE(stop_of(off_by(name, within))) << name;
+    const auto stop = stop_of(off_by(name, beyond));
+    ASSERT_TRUE(stop) << name;
+    EXPECT_EQ(stop->code, "robot_off_drawing");
+    EXPECT_NE(stop->text.find(std::string(name) + " by "), std::string::npos) << stop->text;
+    EXPECT_FALSE(stop_of(off_by(name, beyond, std::abs(beyond)))) << name << " is not known";
+  }
+}
+
+TEST(ModelNotes, AnUnconfirmedRobotFileIsNotedLast) {
+  const std::vector<Note> notes = notes_of(off_by("d4", 20e-3));
+  ASSERT_EQ(notes.size(), 2U);
+  EXPECT_EQ(notes.front().severity, Note::Severity::kStop);
+  EXPECT_EQ(notes.back().code, kNotConfirmed);
+  EXPECT_EQ(notes.back().severity, Note::Severity::kInfo);
+}
+
+TEST(ModelNotes, WhatIsLeftIsHeldAgainstTheStatedSigma) {
+  const auto left = [](double times) {
+    CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
+    parts.training.poses = 60;
+    parts.training.compensated.rms = times * std::sqrt(3.0) * parts.physics.cell->tracker.sigma;
+    std::vector<Note> notes = notes_of(test::demand(CompensatedModel::make(parts)));
+    std::erase_if(notes, [](const Note& note) { return note.code != "left_over_sigma"; });
+    return notes;
+  };
+  EXPECT_TRUE(left(2.9).empty());
+  ASSERT_EQ(left(3.1).size(), 1U);
+  EXPECT_EQ(left(3.1).front().severity, Note::Severity::kWarning);
+  ASSERT_EQ(left(31).size(), 1U);
+  EXPECT_EQ(left(31).front().severity, Note::Severity::kStop);
 }
 
 TEST(ModelNotes, ASourceThatActsIsNot) {
@@ -84,7 +128,7 @@ TEST(ModelNotes, ASourceThatActsIsNot) {
                                         "tracker_moved@9",
                                         "link_bending:2",
                                         "compliance_linear"};
-  const std::vector<std::string> notes = notes_of(model_of(all, kHeavy));
+  const std::vector<std::string> notes = noted(model_of(all, kHeavy));
   EXPECT_TRUE(notes.empty()) << notes.front();
 }
 

@@ -70,7 +70,7 @@ TEST(Sessions, AZeroLostBetweenTwoIsFoundAndDatedAndTheRestOfTheOldDataGoesOnCou
     EXPECT_EQ(parts.sessions[parts.changes.front().session].id, "day-3");
     EXPECT_TRUE(parts.changes.front().could_also_be.empty());
     EXPECT_LT(true_error(model, after), 1e-5);
-    const std::string note = notes_of(model).front();
+    const std::string note = notes_of(model).front().text;
     EXPECT_NE(note.find("since session day-3 (pose day-3/1)"), std::string::npos) << note;
     EXPECT_EQ(test::demand(deserialize(serialize(model), "again")).parts().changes.front().source,
               parts.changes.front().source);
@@ -122,11 +122,11 @@ TEST(Sessions, WhereNoClockTellsTheirOrderTheModelSaysOnWhatItRests) {
   ASSERT_EQ(given_changes.size(), 1u);
   EXPECT_EQ(given_changes.front().session_id, "day-1") << "by their order the arm has changed back";
   EXPECT_TRUE(given_changes.front().rests_on_order);
-  const std::vector<std::string> notes = notes_of(as_given);
-  EXPECT_NE(notes.front().find("rests on the order"), std::string::npos) << notes.front();
-  EXPECT_TRUE(std::any_of(notes.begin(), notes.end(), [](const std::string& note) {
-    return note.find("day-2 is taken for the newest") != std::string::npos;
-  })) << fmt::format("{}", fmt::join(notes, "\n"));
+  const std::vector<Note> notes = notes_of(as_given);
+  EXPECT_NE(notes.front().text.find("rests on the order"), std::string::npos) << notes.front().text;
+  EXPECT_TRUE(std::any_of(notes.begin(), notes.end(), [](const Note& note) {
+    return note.text.find("day-2 is taken for the newest") != std::string::npos;
+  })) << notes.size();
   const CompensatedModel again = test::demand(deserialize(serialize(as_given), "again"));
   EXPECT_TRUE(again.parts().sessions_as_given);
 }
@@ -163,10 +163,10 @@ TEST(Sessions, AnInstrumentThatMeasuresTooLongInOneOfThemSpoilsNothing) {
   EXPECT_EQ(sessions.back().scale, 0);
   EXPECT_TRUE(model.parts().changes.empty());
   EXPECT_LT(true_error(model, robot), 1.15 * true_error(good, robot));
-  const std::vector<std::string> notes = notes_of(model);
-  EXPECT_TRUE(std::any_of(notes.begin(), notes.end(), [](const std::string& note) {
-    return note.find("session day-2 measured lengths") != std::string::npos &&
-           note.find("ppm longer than session day-4") != std::string::npos;
+  const std::vector<Note> notes = notes_of(model);
+  EXPECT_TRUE(std::any_of(notes.begin(), notes.end(), [](const Note& note) {
+    return note.text.find("session day-2 measured lengths") != std::string::npos &&
+           note.text.find("ppm longer than session day-4") != std::string::npos;
   }));
   const CompensatedModel again = test::demand(deserialize(serialize(model), "again"));
   EXPECT_EQ(again.parts().sessions, sessions);
@@ -212,9 +212,9 @@ TEST(Sessions, AnArmThatIsLongerOnWarmerDaysIsLearnedToGrow) {
   EXPECT_NEAR(1e6 * *growth_in(model), 11.5, 0.8);
   EXPECT_FALSE(are_stretched(model.parts().sessions));
   EXPECT_TRUE(model.parts().changes.empty());
-  const std::vector<std::string> notes = notes_of(model);
-  EXPECT_TRUE(std::any_of(notes.begin(), notes.end(), [](const std::string& note) {
-    return note.find("longer in warmer sessions") != std::string::npos;
+  const std::vector<Note> notes = notes_of(model);
+  EXPECT_TRUE(std::any_of(notes.begin(), notes.end(), [](const Note& note) {
+    return note.text.find("longer in warmer sessions") != std::string::npos;
   }));
 }
 
@@ -308,7 +308,7 @@ TEST(Sessions, AReflectorThatSatElsewhereForADaySpoilsNothing) {
     EXPECT_EQ(parts.changes.front().source, "tool_changed@121+1+180");
     EXPECT_LT(true_error(model, robot), 1.1 * true_error(good, robot)) << by.transpose();
     EXPECT_EQ(parts.sessions[2].own_noise, 0);
-    const std::string note = notes_of(model).front();
+    const std::string note = notes_of(model).front().text;
     EXPECT_NE(note.find("in session day-3 alone"), std::string::npos) << note;
     const CompensatedModel again = test::demand(deserialize(serialize(model), "again"));
     EXPECT_TRUE(is_of_one_session(again.parts().changes.front()));
@@ -337,7 +337,7 @@ TEST(Sessions, AZeroOfTheLastJointAndATurnedToolAreAmbiguous) {
   ASSERT_EQ(model.parts().changes.size(), 1u);
   EXPECT_EQ(model.parts().changes.front().source, "joint_slip:6@61");
   EXPECT_FALSE(model.parts().changes.front().could_also_be.empty());
-  EXPECT_NE(notes_of(model).front().find("ambiguous"), std::string::npos);
+  EXPECT_NE(notes_of(model).front().text.find("ambiguous"), std::string::npos);
 }
 
 TEST(Sessions, AColumnDividesAFileAsSeveralFilesDo) {
@@ -381,7 +381,7 @@ TEST(Sessions, OneTooSmallToSayWhereItsTrackerStoodIsLeftOutAndSaid) {
   EXPECT_EQ(model.parts().physics.values, alone.parts().physics.values);
   ASSERT_EQ(model.parts().sessions_left_out.size(), 1u);
   EXPECT_EQ(model.parts().sessions_left_out.front().id, "few");
-  EXPECT_NE(notes_of(model).front().find("nothing was learned from session few: 2 positions"), std::string::npos);
+  EXPECT_NE(notes_of(model).front().text.find("nothing was learned from session few: 2 positions"), std::string::npos);
 }
 
 TEST(Sessions, ANoisySessionCountsForLess) {
@@ -441,8 +441,8 @@ TEST(Sessions, AZeroThatWandersIsFollowedAsARandomWalk) {
   EXPECT_NEAR(drift.rate, 6e-5, 4e-5);
   EXPECT_EQ(drift.steps.size(), steps.size() - 1);
   EXPECT_LT(true_error(model, robot), 1e-5);
-  EXPECT_NE(notes_of(model).front().find(fmt::format("it has moved by {:.2f}", 1e3 * moved)), std::string::npos)
-      << notes_of(model).front();
+  EXPECT_NE(notes_of(model).front().text.find(fmt::format("it has moved by {:.2f}", 1e3 * moved)), std::string::npos)
+      << notes_of(model).front().text;
   const SessionChange told = session_changes(model).front();
   EXPECT_EQ(told.course, SessionChange::Course::kWanders);
   ASSERT_EQ(told.sizes.size(), 1u);

@@ -14,11 +14,14 @@
 #include "clients/cli/service/answers.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
+#include "clients/cli/text/notes_text.h"
 #include "clients/cli/text/tolerance.h"
 #include "clients/cli/work/in_parallel.h"
 #include "server/base/plain_text.h"
 #include "server/compensate/model_file.h"
+#include "server/compensate/model_notes.h"
 #include "server/measurement/pose_columns.h"
+#include "server/report/note_json.h"
 
 namespace trammel::cli {
 
@@ -148,7 +151,8 @@ Result<Corrections> correct_here(const TargetFile& file, const ApplyArguments& a
   if (!payload) return tl::make_unexpected(payload.error());
   if (const Status known = model->check_trained_with(*tool, *payload); !known)
     return tl::make_unexpected(known.error());
-  Corrections corrections{model->provenance().id, joint_types(model->cell().robot), {}};
+  Corrections corrections{model->provenance().id, joint_types(model->cell().robot), {}, notes_of(*model)};
+  warn_of_notes(corrections.notes);
   corrections.items.resize(file.rows.size());
   ProgressLine progress;
   in_parallel(
@@ -252,7 +256,11 @@ Result<Extent> correct(CorrectArguments arguments) {
     return refused("nothing is written: {}", left_alone.substr(0, left_alone.size() - 1));
   }
   const auto verdict = verdict_of(*corrections, arguments.tolerance_mm);
+  if (arguments.strict && verdict) {
+    if (const Status inside = all_inside(*verdict); !inside) return tl::make_unexpected(inside.error());
+  }
   auto json = corrections_json(*file, *corrections);
+  json["notes"] = notes_json(corrections->notes);
   if (verdict) json["tolerance"] = tolerance_json(*verdict);
   const std::string table = corrections_csv(*file, *corrections);
   if (const Status written = write_together({{"--output", arguments.output, table},
@@ -391,7 +399,8 @@ void add_correct(CLI::App& app, Action& chosen) {
                                                 "Exit with 0, not 1, where targets are left as they were");
   command
       ->add_flag("--strict", arguments->strict,
-                 "Write nothing and exit with 3 where any target would be left as it was")
+                 "Write nothing and exit with 3 where any target would be left as it was or, with --tolerance, is not "
+                 "expected inside it with 95 %")
       ->excludes(allow_failed);
   command->add_option("--receipt", arguments->receipt, "What became of each target, as CSV");
   command

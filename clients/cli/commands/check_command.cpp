@@ -8,15 +8,18 @@
 #include "clients/cli/service/health_answers.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
+#include "clients/cli/text/notes_text.h"
 #include "server/base/json_guard.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
+#include "server/compensate/model_notes.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/report/cell_health.h"
 #include "server/report/health_json.h"
 #include "server/report/health_page.h"
+#include "server/report/note_json.h"
 #include "server/report/pages_beside.h"
 #include "server/robot/cell_rules.h"
 
@@ -164,7 +167,10 @@ Status check(const CheckArguments& arguments) {
   const Result<HealthCheck> health = check_health(*model, *batch, options);
   if (!health) return tl::make_unexpected(health.error());
   const auto& rows = batch->rows().measurements;
-  const auto json = health_json(*health, {batch->id(), rows.empty() ? "" : rows.front().pose_id});
+  auto json = health_json(*health, {batch->id(), rows.empty() ? "" : rows.front().pose_id});
+  const std::vector<Note> notes = notes_of(*model);
+  warn_of_notes(notes);
+  json["notes"] = notes_json(notes);
   tell(health_text(*health), {arguments.json, arguments.report});
   const Status written = write_report(json, {model->cell().name, batch->id(), unix_now(), &model->cell()}, arguments);
   if (!written) return written;

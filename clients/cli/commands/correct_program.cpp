@@ -12,6 +12,7 @@
 #include "clients/cli/service/answers.h"
 #include "clients/cli/service/model_answers.h"
 #include "clients/cli/terminal/output.h"
+#include "clients/cli/text/notes_text.h"
 #include "clients/cli/text/receipt_page.h"
 #include "clients/cli/text/receipt_text.h"
 #include "clients/cli/work/in_parallel.h"
@@ -20,6 +21,7 @@
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
+#include "server/compensate/model_notes.h"
 #include "server/measurement/pose_columns.h"
 #include "server/report/pages_beside.h"
 #include "server/robot/cell_papers.h"
@@ -64,11 +66,12 @@ cam::CorrectProgramOptions options_of(const CorrectProgramArguments& arguments) 
 struct Corrected {
   cam::CorrectedProgram program;
   CellPapers papers;
+  std::vector<Note> notes;  ///< of the model
 };
 
 Result<Corrected> with_papers(Result<cam::CorrectedProgram> program, const CompensatedModel& model) {
   if (!program) return tl::make_unexpected(program.error());
-  return Corrected{std::move(*program), papers_of(model.cell()).value_or(CellPapers())};
+  return Corrected{std::move(*program), papers_of(model.cell()).value_or(CellPapers()), notes_of(model)};
 }
 
 Result<Corrected> correct_here(const cam::Program& program, const CorrectProgramArguments& arguments) {
@@ -173,7 +176,7 @@ void add_receipts(const Corrected& done, const CorrectProgramArguments& argument
   if (arguments.json.empty()) return;
   std::optional<ToleranceVerdict> verdict;
   if (arguments.tolerance_mm > 0) verdict = tolerance_verdict(expected_errors(corrected), arguments.tolerance_mm);
-  texts.push_back({arguments.json, receipt_json(corrected, verdict)});
+  texts.push_back({arguments.json, receipt_json(corrected, verdict, done.notes)});
 }
 
 Result<cam::Program> read(const ProgramFiles& files, const CorrectProgramArguments& arguments) {
@@ -206,6 +209,11 @@ Result<Extent> correct_program(const CorrectProgramArguments& arguments) {
   const cam::CorrectedProgram& corrected = done->program;
   const std::string left = left_alone_text(corrected);
   if (arguments.strict && !left.empty()) return refused("nothing is written: {}", left.substr(0, left.size() - 1));
+  if (arguments.strict && arguments.tolerance_mm > 0) {
+    const Status inside = all_inside(tolerance_verdict(expected_errors(corrected), arguments.tolerance_mm));
+    if (!inside) return tl::make_unexpected(inside.error());
+  }
+  warn_of_notes(done->notes);
   Texts texts = texts_of(*files, corrected.files, corrected.changed, *paths);
   add_receipts(*done, arguments, texts);
   if (const Status written = write_texts(texts, *paths); !written) return tl::make_unexpected(written.error());

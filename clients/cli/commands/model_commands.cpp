@@ -9,18 +9,21 @@
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/evaluation_text.h"
+#include "clients/cli/text/notes_text.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
 #include "server/bias/kernels/kernel_spelling.h"
 #include "server/calibrate/jump.h"
 #include "server/compensate/known_rows.h"
 #include "server/compensate/model_file.h"
+#include "server/compensate/model_notes.h"
 #include "server/compensate/world.h"
 #include "server/diagnose/triage.h"
 #include "server/error_sources/cause_words.h"
 #include "server/health/health_check.h"
 #include "server/measurement/gauges.h"
 #include "server/report/model_page.h"
+#include "server/report/note_json.h"
 #include "server/report/pages_beside.h"
 #include "server/robot/cell_rules.h"
 #include "server/trainer/pipeline/refitted.h"
@@ -236,6 +239,8 @@ Status evaluate(const EvaluateArguments& arguments) {
   const Result<InWorld> world = in_world_of(*model, batch->rows());
   if (!world) return tl::make_unexpected(world.error());
   const Evaluation evaluation = model->evaluate(world->batch);
+  const std::vector<Note> notes = notes_of(*model);
+  warn_of_notes(notes);
   if (has_gauges(world->batch) && !arguments.residuals.empty() && has_positions(world->batch)) {
     return failure(ErrorCode::kUsage, "residuals of positions and of distances or touches go into two files")
         .of("--residuals")
@@ -259,6 +264,7 @@ Status evaluate(const EvaluateArguments& arguments) {
   }
   warn_of_foreign_poses(*model, world->batch);
   nlohmann::ordered_json json = evaluation_json(evaluation);
+  json["notes"] = notes_json(notes);
   if (!structure.empty()) json["structure"] = structure;
   if (learned > 0) json["trained_on"] = learned;
   return write_json(arguments.json, json);
@@ -285,6 +291,7 @@ Status report(const ReportArguments& arguments) {
       note = fmt::format("note: {} of the {} poses of {} do not judge the model, because it was trained on them\n",
                          learned, checked->size(), arguments.batch);
   }
+  warn_of_notes(notes_of(*model));
   if (batch) warn_of_foreign_poses(*model, *batch);
   if (const Status written =
           write_output(arguments.output, with_pages_beside(model_page(*model, batch), arguments.output));

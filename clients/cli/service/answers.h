@@ -6,6 +6,7 @@
 
 #include "clients/cli/files/target_file.h"
 #include "clients/session/session.h"
+#include "server/base/note.h"
 #include "server/compensate/compensated_model.h"
 #include "server/measurement/files/joint_list.h"
 
@@ -50,6 +51,7 @@ struct Corrections {
   std::string model_id;
   std::vector<JointType> joint_types;
   std::vector<client::CorrectedTarget> items;  ///< one a target
+  std::vector<Note> notes = {};                ///< of the model, where it is at hand
 };
 
 /// `dx_mm` ... `in_domain`, the predicted pose X_BT, `pose_id`, `model_id`; where asked for, `cxy_mm2` ... `slz_mm` and

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "clients/cli/text/notes_text.h"
 #include "server/base/coverage.h"
 #include "server/base/units.h"
 #include "server/compensate/model_notes.h"
@@ -9,6 +10,7 @@
 #include "server/error_sources/cause_words.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/report/figures_json.h"
+#include "server/report/note_json.h"
 #include "server/report/session_changes_json.h"
 
 namespace trammel::cli {
@@ -252,8 +254,7 @@ std::string suspects_text(const std::vector<SuspectPose>& suspects) {
 
 std::string model_text(const CompensatedModel& model) {
   const CompensatedModel::Parts& parts = model.parts();
-  std::string text = provenance_text(model);
-  for (const std::string& note : notes_of(model)) text += "note: " + note + "\n";
+  std::string text = notes_text(notes_of(model)) + provenance_text(model);
   text += rotation_text(parts) + negative_play_text(parts);
   if (parts.bias_choice) text += choice_text(*parts.bias_choice);
   return text + unidentifiable_text(parts.unidentifiable) + suspects_text(parts.suspects);
@@ -369,7 +370,7 @@ ordered_json model_json(const CompensatedModel& model) {
   json["parameters"] = parameters_json(parts.parameters);
   json["not_identifiable"] = unidentifiable_json(parts.unidentifiable);
   json["training"] = evaluation_json(parts.training);
-  if (const std::vector<std::string> notes = notes_of(model); !notes.empty()) json["notes"] = notes;
+  json["notes"] = notes_json(notes_of(model));
   if (!parts.sessions.empty()) json["sessions"] = sessions_json(parts);
   if (!parts.sessions.empty()) json["order_of_sessions"] = parts.sessions_as_given ? "as_given" : "by_time";
   if (!parts.sessions.empty()) json["between_sessions"] = session_changes_json(session_changes(model));

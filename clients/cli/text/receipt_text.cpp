@@ -10,6 +10,7 @@
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
 #include "server/measurement/files/csv_table.h"
+#include "server/report/note_json.h"
 
 namespace trammel::cli {
 
@@ -131,7 +132,10 @@ std::string receipt_csv(const CorrectedProgram& program) {
   return text;
 }
 
-std::string receipt_json(const CorrectedProgram& program, const std::optional<ToleranceVerdict>& verdict) {
+std::string receipt_json(const CorrectedProgram& program, const std::optional<ToleranceVerdict>& verdict,
+                         const std::vector<Note>& of_model) {
+  std::vector<Note> notes = of_model;
+  for (const std::string& one : program.notes) notes.push_back({"program", Note::Severity::kInfo, one});
   ordered_json inserted = ordered_json::array();
   for (const cam::InsertedLine& line : program.inserted)
     inserted.push_back({{"file", line.file}, {"line", line.line}, {"text", line.text}});
@@ -139,7 +143,7 @@ std::string receipt_json(const CorrectedProgram& program, const std::optional<To
                        {"moves", program.moves},
                        {"moves_corrected", program.moves_corrected},
                        {"left_alone", program.left_alone()},
-                       {"notes", program.notes},
+                       {"notes", notes_json(notes)},
                        {"largest_step",
                         {{"mm", json_mm(program.largest_step_mm)},
                          {"file", program.largest_step_file},

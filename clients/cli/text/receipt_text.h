@@ -2,9 +2,11 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "clients/cam/correct_program.h"
 #include "clients/cli/text/receipt_page.h"
+#include "server/base/note.h"
 
 /// What became of a program, for people and programs.
 namespace trammel::cli {
@@ -13,7 +15,8 @@ namespace trammel::cli {
 /// the file, `x_mm` ... of the position in the robot's base, errors to expect, `rounding_mm`, `message`, `suggestion`.
 [[nodiscard]] std::string receipt_csv(const cam::CorrectedProgram& program);
 [[nodiscard]] std::string receipt_json(const cam::CorrectedProgram& program,
-                                       const std::optional<ToleranceVerdict>& verdict);
+                                       const std::optional<ToleranceVerdict>& verdict,
+                                       const std::vector<Note>& of_model = {});
 /// `148 motions, 141 corrected; 60 targets: 55 ok, 5 refused`, and what is left with the reasons.
 [[nodiscard]] std::string receipt_summary(const cam::CorrectedProgram& program);
 [[nodiscard]] std::string left_alone_text(const cam::CorrectedProgram& program);

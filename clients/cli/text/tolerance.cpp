@@ -52,6 +52,17 @@ ToleranceVerdict tolerance_verdict(const std::vector<ExpectedError>& targets, do
   return verdict;
 }
 
+Status all_inside(const ToleranceVerdict& verdict) {
+  const std::size_t all = verdict.targets + verdict.unknown;
+  if (verdict.after == all) return {};
+  return refused(
+             "nothing is written: {} of {} targets are not inside {:g} mm with 95 %{}", all - verdict.after, all,
+             verdict.tolerance_mm,
+             verdict.unknown > 0 ? fmt::format(", {} of them because their error is not known", verdict.unknown) : "")
+      .of("--tolerance")
+      .beyond(verdict.after, all);
+}
+
 std::string verdict_text(const ToleranceVerdict& verdict) {
   return fmt::format(
              "tolerance {:.4g} mm: {} of {} targets are inside with 95 % or more (before: {}); {:.1f} are expected "

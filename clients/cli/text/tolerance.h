@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "server/base/result.h"
+
 namespace trammel::cli {
 
 /// Of one target, mm; not finite: not known.
@@ -23,6 +25,8 @@ struct ToleranceVerdict {
   double expected_before = 0, expected_after = 0;  ///< mean number inside
 };
 [[nodiscard]] ToleranceVerdict tolerance_verdict(const std::vector<ExpectedError>& targets, double tolerance_mm);
+/// Refuses, where any target is not inside with 95 %, or its error is not known: nothing is written then.
+[[nodiscard]] Status all_inside(const ToleranceVerdict& verdict);
 /// `tolerance 0.2 mm: 33 of 35 targets are inside with 95 % or more (before: 0); 34.1 are expected inside`
 [[nodiscard]] std::string verdict_text(const ToleranceVerdict& verdict);
 /// `tolerance` of what `correct --json` writes.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/base/units.h"
+#include "server/compensate/model_notes.h"
 
 namespace trammel {
 
@@ -51,6 +52,11 @@ GateVerdict judge_by_record(const CompensatedModel& candidate, const RecordInFor
   return {false, "not in force: " + why + "; activate it if it is wanted", false, why, {{}, rms, limit}};
 }
 
+/// Whatever the judges say: its notes keep it from being put in force by itself.
+GateVerdict left_to_a_person(const Note& stop, GateFigures figures) {
+  return {false, "not in force: " + stop.text + "; activate it if it is right", true, stop.text, std::move(figures)};
+}
+
 }  // namespace
 
 GateVerdict verdict_on(const CompensatedModel& candidate, const ServedModel* in_force,
@@ -59,7 +65,9 @@ GateVerdict verdict_on(const CompensatedModel& candidate, const ServedModel* in_
   GateQuestion question{candidate, in_force, std::move(served_before), sessions, 0};
   if (in_force != nullptr) question.first_new = first_new(sessions, in_force->model);
   GateVerdict verdict = judge(question, options);
-  if (!verdict.put_in_force || !record) return verdict;
+  if (!verdict.put_in_force) return verdict;
+  if (const auto stop = stop_of(candidate)) return left_to_a_person(*stop, std::move(verdict.figures));
+  if (!record) return verdict;
   return judge_by_record(candidate, *record, sessions, options.accept_ratio, std::move(verdict));
 }
 

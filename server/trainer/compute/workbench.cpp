@@ -288,7 +288,10 @@ TrainOptions Workbench::train_options(const CheckedBatch& batch, const ComputeWa
 Made Workbench::made(CompensatedModel model, std::string remarks, std::vector<JudgingSession> sessions) {
   sessions_ = std::move(sessions);
   candidate_ = model;
-  remarks += joined_by_semicolons(warnings_of(model, model.parts().validation));
+  std::vector<std::string> texts;
+  for (const Note& note : warnings_of(model, model.parts().validation))
+    if (note.code != kNotConfirmed) texts.push_back(note.text);  // of every model of the cell; its page says it
+  remarks += joined_by_semicolons(texts);
   return {std::move(model), std::move(remarks), ""};
 }
 

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+namespace trammel {
+
+/// Something that whoever uses a result should know.
+struct Note {
+  enum class Severity {
+    kInfo,
+    kWarning,
+    kStop  ///< a model with it is not put in force by itself: a person decides
+  };
+  std::string code;  ///< for programs: `robot_not_confirmed`
+  Severity severity = Severity::kInfo;
+  std::string text;  ///< one sentence
+};
+
+[[nodiscard]] inline const char* to_text(Note::Severity severity) {
+  switch (severity) {
+    case Note::Severity::kInfo:
+      return "info";
+    case Note::Severity::kWarning:
+      return "warning";
+    case Note::Severity::kStop:
+      return "stop";
+  }
+  return "";
+}
+
+/// The gravest first; those of one severity in the order in which they stand.
+[[nodiscard]] inline std::vector<Note> gravest_first(std::vector<Note> notes) {
+  std::stable_sort(notes.begin(), notes.end(), [](const Note& a, const Note& b) { return a.severity > b.severity; });
+  return notes;
+}
+
+}  // namespace trammel
