@@ -174,7 +174,7 @@ void add_off_drawing(const CompensatedModel::Parts& parts, std::vector<Note>& no
   const std::string off = off_drawing(parts);
   if (off.empty()) return;
   notes.push_back(
-      {"robot_off_drawing", Severity::kStop,
+      {kOffDrawing, Severity::kStop,
        fmt::format(
            "no robot is so far off its drawing: {}; is it this robot's file, and is the tool in the cell file the one "
            "that was measured (null in its place finds it)? Where the file is not the controller's, corrected poses "

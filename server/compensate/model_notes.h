@@ -11,6 +11,8 @@ namespace trammel {
 
 /// Of a robot file that nobody compared with the controller: what most models have.
 constexpr const char* kNotConfirmed = "robot_not_confirmed";
+/// Of a robot file that cannot be this robot's: no corrected pose can be promised.
+constexpr const char* kOffDrawing = "robot_off_drawing";
 
 /// What a user of the model should know, the gravest first. Every door asks here: command line, service, pages,
 /// library.

@@ -216,7 +216,8 @@ std::optional<std::string> why_no_promise(const CompensatedModel& model,
     if (const auto foreign = foreign_poses(model, *batch))
       return "Nothing can be promised by these measurements: " + *foreign;
   }
-  if (const auto stop = stop_of(model)) return "Nothing is promised of corrected poses: " + stop->text + ".";
+  if (const auto stop = stop_of(model); stop && stop->code == kOffDrawing)
+    return "Nothing is promised of corrected poses: " + stop->text + ".";
   if (!accuracy || freedom_left(model, *accuracy) >= kFewestFreedom) return std::nullopt;
   const int poses = model.provenance().training_poses;
   return fmt::format(

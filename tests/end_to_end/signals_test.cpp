@@ -29,7 +29,7 @@ TEST_F(ALibrarysThread, DoesNotTakeTheReload) {
   for (int i = 0; i < 5; ++i) {
     const std::size_t before = process_->standard_error().size();
     process_->signal(SIGHUP);
-    ASSERT_TRUE(process_->wait_for_line("\"event\":\"reloaded\"", kLimit)) << process_->standard_error().substr(before);
+    ASSERT_TRUE(process_->wait_for_line("read again", kLimit)) << process_->standard_error().substr(before);
   }
   process_->signal(SIGTERM);
   EXPECT_EQ(process_->wait(kLimit), 0) << process_->standard_error();

@@ -254,7 +254,8 @@ std::string suspects_text(const std::vector<SuspectPose>& suspects) {
 
 std::string model_text(const CompensatedModel& model) {
   const CompensatedModel::Parts& parts = model.parts();
-  std::string text = notes_text(notes_of(model)) + provenance_text(model);
+  const std::vector<Note> notes = notes_of(model);
+  std::string text = notes_text(grave(notes)) + provenance_text(model) + notes_text(for_information(notes));
   text += rotation_text(parts) + negative_play_text(parts);
   if (parts.bias_choice) text += choice_text(*parts.bias_choice);
   return text + unidentifiable_text(parts.unidentifiable) + suspects_text(parts.suspects);

@@ -8,6 +8,18 @@
 
 namespace trammel::cli {
 
+std::vector<Note> grave(const std::vector<Note>& notes) {
+  std::vector<Note> all = notes;
+  std::erase_if(all, [](const Note& note) { return note.severity == Note::Severity::kInfo; });
+  return all;
+}
+
+std::vector<Note> for_information(const std::vector<Note>& notes) {
+  std::vector<Note> all = notes;
+  std::erase_if(all, [](const Note& note) { return note.severity != Note::Severity::kInfo; });
+  return all;
+}
+
 std::string notes_text(const std::vector<Note>& notes) {
   std::string text;
   for (const Note& note : notes)
@@ -17,10 +29,7 @@ std::string notes_text(const std::vector<Note>& notes) {
 }
 
 void warn_of_notes(const std::vector<Note>& notes) {
-  std::vector<Note> grave;
-  for (const Note& note : notes)
-    if (note.severity != Note::Severity::kInfo) grave.push_back(note);
-  std::fputs(shown_lines(notes_text(grave)).c_str(), stderr);
+  std::fputs(shown_lines(notes_text(grave(notes))).c_str(), stderr);
 }
 
 }  // namespace trammel::cli

@@ -7,6 +7,10 @@
 
 namespace trammel::cli {
 
+/// Those that lead: what a user must know before he uses the model.
+[[nodiscard]] std::vector<Note> grave(const std::vector<Note>& notes);
+/// The others.
+[[nodiscard]] std::vector<Note> for_information(const std::vector<Note>& notes);
 /// A line each: `stop: ...`, `warning: ...`, `note: ...`.
 [[nodiscard]] std::string notes_text(const std::vector<Note>& notes);
 
