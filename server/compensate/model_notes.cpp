@@ -7,7 +7,6 @@
 #include "server/compensate/paired_gain.h"
 #include "server/compensate/session_changes.h"
 #include "server/error_sources/anchors.h"
-#include "server/error_sources/shipped_causes.h"
 #include "server/robot/cell_doubts.h"
 #include "server/robot/robot_confirmation.h"
 
@@ -157,7 +156,7 @@ std::string off_drawing(const CompensatedModel::Parts& parts) {
   std::size_t first = 0;
   for (const ErrorSourcePtr& source : parts.physics.sources) {
     const std::size_t count = source->parameters().size();
-    for (std::size_t i = first; i < first + count && &source->cause() == &causes::geometry(); ++i) {
+    for (std::size_t i = first; i < first + count && source->cause().part == causes::Part::kLinks; ++i) {
       const IdentifiedParameter& one = parts.parameters[i];
       const Drawing* drawing = drawing_of(one.parameter.name);
       if (drawing == nullptr || std::abs(one.value) - 2 * one.stddev <= drawing->limit) continue;
