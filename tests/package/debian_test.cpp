@@ -153,33 +153,6 @@ void put_everywhere(std::string& text, const std::string& what, const std::strin
     text.replace(at, what.size(), by);
 }
 
-/// What the unit runs before it starts, as /bin/sh gets it, with the programs of `root` and this server file.
-std::string start_check(const test::TemporaryFolder& root, const std::string& server_file) {
-  const std::string unit = test::read_file(root.file("lib/systemd/system/trammeld.service"));
-  std::smatch found;
-  EXPECT_TRUE(std::regex_search(unit, found, std::regex("ExecStartPre=/bin/sh -c '(.*)'"))) << unit;
-  std::string command = found[1];
-  put_everywhere(command, "/usr/bin/trammeld", root.path().string() + "/usr/bin/trammeld");
-  put_everywhere(command, "/etc/trammel/server.yaml", server_file);
-  put_everywhere(command, "$$", "$");
-  return command;
-}
-
-TEST_F(Debian, AMisspeltKeyEndsTheStartAtOnceWithItsLine) {
-  const test::TemporaryFolder root;
-  ASSERT_EQ(test::run({"/usr/bin/dpkg-deb", "-x", package("trammeld"), root.path().string()}, kLimit).exit_code, 0);
-  const std::string start =
-      "version: 1\nserver: checked\ncells: [" + std::string(TRAMMEL_SOURCE_DIR) + "/config/cell-7.yaml]\n";
-  const auto checked = [&](const std::string& text) {
-    return test::run({"/bin/sh", "-c", start_check(root, root.write("server.yaml", text))}, kLimit);
-  };
-  const test::Finished wrong = checked(start + "store: trammel.db\ndds: {prot: 17555}\n");
-  EXPECT_NE(wrong.exit_code, 0);
-  EXPECT_NE(wrong.err.find("server.yaml row 5"), std::string::npos) << wrong.err;
-  EXPECT_NE(wrong.err.find("prot"), std::string::npos) << wrong.err;
-  EXPECT_EQ(checked(start + "store: " + root.file("trammel.db") + "\n").exit_code, 0);
-}
-
 TEST_F(Debian, SystemdTakesTheUnitsAndFindsThemHardlyExposed) {
   if (!is_here("systemd-analyze")) GTEST_SKIP() << "no systemd-analyze here";
   const test::TemporaryFolder root;
