@@ -5,6 +5,7 @@
 
 #include "clients/cli/command_line.h"
 #include "server/base/text_file.h"
+#include "server/base/units.h"
 #include "server/compensate/model_file.h"
 #include "server/measurement/files/csv_table.h"
 #include "tests/support/small_cell.h"
@@ -101,6 +102,26 @@ TEST_F(CorrectProgram, WhatIsLeftDecidesTheExitCode) {
   EXPECT_EQ(correct({"--model", model(), before, "-o", file("out.mod")}), kNotAll);
   EXPECT_EQ(correct({"--model", model(), before, "-o", file("allowed.mod"), "--allow-failed"}), 0);
   EXPECT_EQ(text("allowed.mod"), text("out.mod"));
+}
+
+TEST_F(CorrectProgram, AStrictToleranceWritesNothingWhereATargetIsOutOfDomain) {
+  const std::string before = module("m.mod");
+  ModelParts learned_elsewhere = load_model(model()).value().parts();
+  learned_elsewhere.q_min.setConstant(from_deg(-1));
+  learned_elsewhere.q_max.setConstant(from_deg(1));
+  folder_.write("elsewhere.model", serialize(CompensatedModel::make(std::move(learned_elsewhere)).value()));
+  const auto corrected = [&](const std::string& by, const std::string& out, std::vector<std::string> more) {
+    more.insert(more.begin(), {"--model", file(by), before, "-o", file(out), "--tolerance", "0.2", "--receipt",
+                               file(out + ".csv"), "--json", file(out + ".json")});
+    return correct(std::move(more));
+  };
+  EXPECT_EQ(corrected("elsewhere.model", "strict.mod", {"--strict"}), kRefusedData);
+  for (const char* name : {"strict.mod", "strict.mod.original", "strict.mod.csv", "strict.mod.json"})
+    EXPECT_FALSE(exists(name)) << name;
+  EXPECT_EQ(corrected("elsewhere.model", "told.mod", {}), 0) << "without --strict it is only told";
+  EXPECT_EQ(nlohmann::json::parse(text("told.mod.json"))["tolerance"]["out_of_domain"], 1);
+  EXPECT_EQ(corrected("cell.model", "in_domain.mod", {"--strict"}), 0);
+  EXPECT_TRUE(exists("in_domain.mod"));
 }
 
 TEST_F(CorrectProgram, WrongUsageChangesNothing) {

@@ -238,7 +238,7 @@ std::optional<ToleranceVerdict> verdict_of(const Corrections& corrections, doubl
   if (tolerance_mm <= 0) return std::nullopt;
   std::vector<ExpectedError> errors;
   for (const client::CorrectedTarget& item : corrections.items)
-    errors.push_back({item.error_before_mm, item.error_after_mm, item.sigma_mm});
+    errors.push_back({item.error_before_mm, item.error_after_mm, item.sigma_mm, item.status != "out_of_domain"});
   return tolerance_verdict(errors, tolerance_mm);
 }
 
@@ -252,12 +252,9 @@ Result<Extent> correct(CorrectArguments arguments) {
       arguments.service.service ? correct_by_service(*file, arguments) : correct_here(*file, arguments);
   if (!corrections) return tl::make_unexpected(corrections.error());
   const std::string left_alone = left_alone_text(*file, *corrections);
-  if (arguments.strict && !left_alone.empty()) {
-    return refused("nothing is written: {}", left_alone.substr(0, left_alone.size() - 1));
-  }
   const auto verdict = verdict_of(*corrections, arguments.tolerance_mm);
-  if (arguments.strict && verdict) {
-    if (const Status inside = all_inside(*verdict); !inside) return tl::make_unexpected(inside.error());
+  if (arguments.strict) {
+    if (const Status held = check_strictly(left_alone, verdict); !held) return tl::make_unexpected(held.error());
   }
   auto json = corrections_json(*file, *corrections);
   json["notes"] = notes_json(corrections->notes);
@@ -398,9 +395,10 @@ void add_correct(CLI::App& app, Action& chosen) {
   CLI::Option* allow_failed = command->add_flag("--allow-failed", arguments->allow_failed,
                                                 "Exit with 0, not 1, where targets are left as they were");
   command
-      ->add_flag("--strict", arguments->strict,
-                 "Write nothing and exit with 3 where any target would be left as it was or, with --tolerance, is not "
-                 "expected inside it with 95 %")
+      ->add_flag(
+          "--strict", arguments->strict,
+          "Write nothing and exit with 3 where any target would be left as it was or, with --tolerance, is not inside "
+          "it with 95 % or is out of domain")
       ->excludes(allow_failed);
   command->add_option("--receipt", arguments->receipt, "What became of each target, as CSV");
   command

@@ -166,17 +166,20 @@ Result<Extent> undo(const ProgramFiles& marked, const CorrectProgramArguments& a
   return Extent::kAll;
 }
 
-void add_receipts(const Corrected& done, const CorrectProgramArguments& arguments, Texts& texts) {
+std::optional<ToleranceVerdict> verdict_of(const cam::CorrectedProgram& corrected, double tolerance_mm) {
+  if (tolerance_mm <= 0) return std::nullopt;
+  return tolerance_verdict(expected_errors(corrected), tolerance_mm);
+}
+
+void add_receipts(const Corrected& done, const CorrectProgramArguments& arguments,
+                  const std::optional<ToleranceVerdict>& verdict, Texts& texts) {
   const cam::CorrectedProgram& corrected = done.program;
   if (!arguments.report.empty()) {
     const std::string page = receipt_page(corrected, arguments.tolerance_mm, done.papers);
     texts.push_back({arguments.report, with_pages_beside(page, arguments.report)});
   }
   if (!arguments.receipt.empty()) texts.push_back({arguments.receipt, receipt_csv(corrected)});
-  if (arguments.json.empty()) return;
-  std::optional<ToleranceVerdict> verdict;
-  if (arguments.tolerance_mm > 0) verdict = tolerance_verdict(expected_errors(corrected), arguments.tolerance_mm);
-  texts.push_back({arguments.json, receipt_json(corrected, verdict, done.notes)});
+  if (!arguments.json.empty()) texts.push_back({arguments.json, receipt_json(corrected, verdict, done.notes)});
 }
 
 Result<cam::Program> read(const ProgramFiles& files, const CorrectProgramArguments& arguments) {
@@ -208,19 +211,16 @@ Result<Extent> correct_program(const CorrectProgramArguments& arguments) {
   if (!done) return tl::make_unexpected(done.error());
   const cam::CorrectedProgram& corrected = done->program;
   const std::string left = left_alone_text(corrected);
-  if (arguments.strict && !left.empty()) return refused("nothing is written: {}", left.substr(0, left.size() - 1));
-  if (arguments.strict && arguments.tolerance_mm > 0) {
-    const Status inside = all_inside(tolerance_verdict(expected_errors(corrected), arguments.tolerance_mm));
-    if (!inside) return tl::make_unexpected(inside.error());
+  const auto verdict = verdict_of(corrected, arguments.tolerance_mm);
+  if (arguments.strict) {
+    if (const Status held = check_strictly(left, verdict); !held) return tl::make_unexpected(held.error());
   }
   warn_of_notes(done->notes);
   Texts texts = texts_of(*files, corrected.files, corrected.changed, *paths);
-  add_receipts(*done, arguments, texts);
+  add_receipts(*done, arguments, verdict, texts);
   if (const Status written = write_texts(texts, *paths); !written) return tl::make_unexpected(written.error());
-  std::string told = receipt_summary(corrected) + left;
-  if (arguments.tolerance_mm > 0)
-    told += verdict_text(tolerance_verdict(expected_errors(corrected), arguments.tolerance_mm)) + "\n";
-  fmt::print(stderr, "{}", shown_lines(told));
+  const std::string held_against = verdict ? verdict_text(*verdict) + "\n" : "";
+  fmt::print(stderr, "{}", shown_lines(receipt_summary(corrected) + left + held_against));
   return left.empty() || arguments.allow_failed ? Extent::kAll : Extent::kPart;
 }
 

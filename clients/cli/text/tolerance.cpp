@@ -42,6 +42,7 @@ ToleranceVerdict tolerance_verdict(const std::vector<ExpectedError>& targets, do
       continue;
     }
     ++verdict.targets;
+    if (!one.in_domain) ++verdict.out_of_domain;
     const double before = share_inside(tolerance_mm, one.before_mm, one.sigma_mm);
     const double after = share_inside(tolerance_mm, one.after_mm, one.sigma_mm);
     verdict.expected_before += before;
@@ -52,17 +53,6 @@ ToleranceVerdict tolerance_verdict(const std::vector<ExpectedError>& targets, do
   return verdict;
 }
 
-Status all_inside(const ToleranceVerdict& verdict) {
-  const std::size_t all = verdict.targets + verdict.unknown;
-  if (verdict.after == all) return {};
-  return refused(
-             "nothing is written: {} of {} targets are not inside {:g} mm with 95 %{}", all - verdict.after, all,
-             verdict.tolerance_mm,
-             verdict.unknown > 0 ? fmt::format(", {} of them because their error is not known", verdict.unknown) : "")
-      .of("--tolerance")
-      .beyond(verdict.after, all);
-}
-
 std::string verdict_text(const ToleranceVerdict& verdict) {
   return fmt::format(
              "tolerance {:.4g} mm: {} of {} targets are inside with 95 % or more (before: {}); {:.1f} are expected "
@@ -71,12 +61,22 @@ std::string verdict_text(const ToleranceVerdict& verdict) {
          (verdict.unknown > 0 ? fmt::format("; of {} the error is not known", verdict.unknown) : "");
 }
 
+Status check_strictly(const std::string& left_alone, const std::optional<ToleranceVerdict>& verdict) {
+  if (!left_alone.empty()) return refused("nothing is written: {}", left_alone.substr(0, left_alone.size() - 1));
+  if (!verdict) return {};
+  if (verdict->after == verdict->targets && verdict->unknown == 0 && verdict->out_of_domain == 0) return {};
+  std::string why = verdict_text(*verdict);
+  if (verdict->out_of_domain > 0) why += fmt::format("; {} are out of domain", verdict->out_of_domain);
+  return refused("nothing is written: {}", why);
+}
+
 nlohmann::ordered_json tolerance_json(const ToleranceVerdict& verdict) {
   return {{"tolerance_mm", verdict.tolerance_mm},
           {"targets", verdict.targets},
           {"inside_before", verdict.before},
           {"inside_after", verdict.after},
-          {"expected_inside_after", verdict.expected_after}};
+          {"expected_inside_after", verdict.expected_after},
+          {"out_of_domain", verdict.out_of_domain}};
 }
 
 }  // namespace trammel::cli
