@@ -59,6 +59,10 @@ inline constexpr double kSameTemperature = 0.5;
 /// Times the squares of poses held out that an anonymous function leaves: a cause of the whole arm that leaves no more
 /// takes its place, and another one that leaves no more than the best of them is its rival.
 inline constexpr double kAsGoodHeldOut = 1.05;
+/// Times the stated noise that is left where nothing was found at all, beyond which each cause is tried not to first
+/// order; and the share of the squares of poses held out that it may leave to be named.
+inline constexpr double kLeavesMuch = 3;
+inline constexpr double kMuchBetterHeldOut = 0.5;
 
 // Naming: which other causes explain a finding as well.
 
