@@ -59,5 +59,30 @@ TEST(WholeList, ARailThatRunsOffItsDrawnDirectionIsLinkGeometry) {
   }
 }
 
+TEST(WholeList, AWristCouplingTooLargeForADerivativeIsFound) {
+  const test::TemporaryFolder folder;
+  const std::string text = fmt::format(
+      "version: 1\ncell: wrist\nrobot: {}/models/yaskawa_gp25.yaml\nbase: null\ntools: {{t1: null}}\n"
+      "tracker: {{sigma_mm: 0.03}}\nmodel: {{error_sources: [base, tool, geometry], bias: none}}\n",
+      TRAMMEL_SOURCE_DIR);
+  const auto cell = std::make_shared<const Cell>(test::demand(read_cell(folder.write("cell.yaml", text))));
+  VirtualRobot robot{test::demand(make_physical_model(cell, {"wrist_coupling"})), 30e-6, 0, {}};
+  robot.truth.tools.at("t1").translation() = Vector3(0.12, 0.03, 0.2);
+  robot.truth.values(2) = -1.0 / 50;  // joint 6 follows joint 5
+  SimulateOptions options;
+  options.orientation = false;
+  const MeasurementBatch batch = test::demand(simulate(robot, test::demand(plan_poses(*cell, {80, 3})), options));
+  DiagnoseOptions quick;
+  quick.draws = 200;
+  quick.next_poses = 0;
+  quick.recovery = false;
+  const Diagnosis found = test::demand(diagnose(cell, test::demand(check_against_cell(batch, *cell)), quick));
+  ASSERT_FALSE(found.findings.empty()) << found.sentence;
+  const Finding& one = found.findings.front();
+  const auto is_coupling = [](const Cause& cause) { return cause.cause == "wrist_coupling"; };
+  EXPECT_TRUE(is_coupling(one.cause) || std::any_of(one.could_also_be.begin(), one.could_also_be.end(), is_coupling))
+      << found.sentence;
+}
+
 }  // namespace
 }  // namespace trammel
