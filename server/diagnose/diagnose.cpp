@@ -14,6 +14,7 @@
 #include "server/diagnose/families/candidates.h"
 #include "server/diagnose/search/search.h"
 #include "server/diagnose/tell/answers.h"
+#include "server/diagnose/tell/between_sessions.h"
 #include "server/diagnose/tell/more_than_noise.h"
 #include "server/diagnose/tell/row_mistakes.h"
 #include "server/diagnose/tell/wording.h"
@@ -88,9 +89,13 @@ Result<PreparedBatch> prepare(const Cell& cell, const CheckedBatch& batch,
   // Where rows had to be moved, what begins at a pose is told by its pose id, not by a row.
   prepared.sorted = !batch.is_in_order_of_time();
   const CheckedBatch ordered = batch.in_order_of_time();
-  MeasurementBatch all = aligned(ordered.rows(), sessions, cell.tracker);
-  MergedRepeats merged = merge_repeats(aligned(ordered.training(), sessions, cell.tracker), cell.tracker.sigma);
-  prepared.validation = aligned(ordered.held_out(), sessions, cell.tracker);
+  prepared.sessions = with_noise_as_repeated(sessions, ordered.rows(), cell.tracker);
+  const auto in_one_world = [&](const MeasurementBatch& rows) {
+    return aligned(rows, prepared.sessions, cell.tracker);
+  };
+  MeasurementBatch all = in_one_world(ordered.rows());
+  MergedRepeats merged = merge_repeats(in_one_world(ordered.training()), cell.tracker.sigma);
+  prepared.validation = in_one_world(ordered.held_out());
   prepared.surrogates = put_in_surrogates(all);
   take_over_surrogates(prepared.surrogates, all, merged.batch);
   take_over_surrogates(prepared.surrogates, all, prepared.validation);
@@ -160,18 +165,6 @@ Result<SearchResult> searched(const std::shared_ptr<const Cell>& cell, const Pre
   const Status go_on = report_progress(options, "measuring the gain", 0.65);
   if (!go_on) return tl::make_unexpected(go_on.error());
   return result;
-}
-
-/// In which session each finding began that begins at a pose.
-void tell_since(const MeasurementBatch& batch, Diagnosis& diagnosis) {
-  if (!has_sessions(batch)) return;
-  for (Finding& finding : diagnosis.findings) {
-    const auto pose = std::find_if(batch.measurements.begin(), batch.measurements.end(), [&](const Measurement& m) {
-      return !finding.cause.pose_id.empty() && m.pose_id == finding.cause.pose_id;
-    });
-    if (pose != batch.measurements.end())
-      finding.since_session = batch.sessions[static_cast<std::size_t>(pose->session)];
-  }
 }
 
 /// What changed on the arm between two sessions, and on what that rests.
@@ -256,6 +249,7 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
                    }});
   if (const Status done = run(steps, options); !done) return tl::make_unexpected(done.error());
   tell_sessions(*together, diagnosis);
+  doubt_changes(batch.rows(), diagnosis);
   diagnosis.sentence = sentence_for(diagnosis) + told_of_sessions(diagnosis) + told_of_jump(cell, batch, diagnosis);
   return diagnosis;
 }

@@ -33,6 +33,11 @@ inline constexpr double kSlowInstead = 5;
 inline constexpr double kStepShare = 0.04;
 /// Nat that chance takes off: a step of strength 75 or less need not win, but must not lose.
 inline constexpr double kStepChance = 3;
+/// Share of the squares of poses held out that a cause must take away: one per cent of their rms. A name that gains
+/// less is none, however sure it is.
+inline constexpr double kLeastGain = 0.02;
+/// Standard deviations by which that gain must be beyond chance: 95 %, one side.
+inline constexpr double kGainBeyondChance = 1.645;
 /// How many named causes together may beat one anonymous function.
 inline constexpr int kNamedPath = 3;
 /// Nat by which a cause that begins at a pose must beat the same cause from the first pose on, and a map of a joint an
@@ -50,6 +55,14 @@ inline constexpr double kOutAsWell = 0.25;
 inline constexpr double kSmallestSpan = 0.035;
 /// K between the coldest and the warmest pose: less is one temperature, and nothing grows.
 inline constexpr double kSameTemperature = 0.5;
+
+/// Times the squares of poses held out that an anonymous function leaves: a cause of the whole arm that leaves no more
+/// takes its place, and another one that leaves no more than the best of them is its rival.
+inline constexpr double kAsGoodHeldOut = 1.05;
+/// Times the stated noise that is left where nothing was found at all, beyond which each cause is tried not to first
+/// order; and the share of the squares of poses held out that it may leave to be named.
+inline constexpr double kLeavesMuch = 3;
+inline constexpr double kMuchBetterHeldOut = 0.5;
 
 // Naming: which other causes explain a finding as well.
 
@@ -89,6 +102,8 @@ inline constexpr double kPathStep = 0.2;
 
 // Doubting: what makes a finding unsure once everything was found.
 
+/// Share of the range of all other poses by which a pose must lie beyond them in a joint to stand at the edge.
+inline constexpr double kBeyondOthers = 0.05;
 /// Share of the size of what is unknown: an effect that is smaller may be part of it.
 inline constexpr double kDwarfed = 0.25;
 /// Nat that the other numbers of its source must explain for a cause to be named as a whole instead of by one number.
@@ -111,6 +126,10 @@ inline constexpr std::size_t kFewestHeldOut = 7;
 /// Chance that any of the held-out poses that fit is called one that fits neither model.
 inline constexpr double kMisjudgedHeldOut = 0.01;
 
+/// m that parts move at most when they warm up, and rad that a joint's zero does: larger is something loose.
+inline constexpr double kWarmthMoves = 5e-4;
+inline constexpr double kWarmthTurns = 1e-3;
+
 // Rows that say what was done wrong with them.
 
 /// Standard deviations of an axis within which a pose that fits nothing fits as another tool, payload or row: of three
@@ -132,6 +151,10 @@ inline constexpr double kSigmaKnownTo = 0.1;
 inline constexpr double kNoiseDeviations = 2;
 /// Times the stated standard deviation, beyond which nobody calls it noise: exp(2 * 0.104), of 200 poses.
 inline constexpr double kMoreThanNoise = 1.23;
+
+/// Holm-corrected chance below which what is left changes with a joint, the torque or the time, though no function was
+/// found that says how.
+inline constexpr double kChangesWith = 1e-3;
 
 // What these poses could not have shown, and what they cannot tell apart.
 

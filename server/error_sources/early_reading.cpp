@@ -9,14 +9,14 @@ constexpr double kShare = 1e-4;  // of the last move, prior
 
 std::vector<Parameter> shares(int joints) {
   std::vector<Parameter> all;
-  for (int j = 1; j <= joints; ++j) all.push_back({fmt::format("early{}", j), "ppm", 1e6, 0, kShare});
+  for (int j = 1; j <= joints; ++j) all.push_back({fmt::format("early{}", j), "ppm", 1e6, 0, kShare, 0.0});
   return all;
 }
 
 /// Robot or tracker are read before the arm stands still: each joint still lacks a share of its last move, delta q = -e
 /// (q - q_before). A servo that settles leaves the same share of every move after the same time; an instrument that
-/// begins to average too early sees the end of the same way. It belongs to the measuring: nothing that is served has
-/// it.
+/// begins to average too early sees the end of the same way. e is not negative: a joint that goes too far lacks
+/// nothing, and waiting does not bring it back. It belongs to the measuring: nothing that is served has it.
 class EarlyReading final : public JointError {
  public:
   EarlyReading(const SourceSpec& spec, int joints) : JointError(spec.text, -1, shares(joints)) {}

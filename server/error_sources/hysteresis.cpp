@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "server/error_sources/parameter.h"
+#include "server/error_sources/error_source.h"
 #include "server/error_sources/shipped_causes.h"
 
 namespace trammel {
@@ -14,13 +14,14 @@ constexpr double kShortestWay = 1e-3;
 
 /// Friction in a gear holds the joint back, by as much as it was moved to get there: delta q = -h m / sqrt(m^2 + w^2),
 /// m = q - q_before. Long moves end in `backlash`, a step by the side alone; moves shorter than w leave less. The pose
-/// before is all that it remembers. Where nobody knows that pose there is none: its mean over both sides.
+/// before is all that it remembers. h is not negative: friction never takes a joint farther than it was sent. Where
+/// nobody knows that pose there is none: its mean over both sides.
 class Hysteresis final : public ErrorSource {
  public:
   explicit Hysteresis(const SourceSpec& spec)
       : name_(spec.text),
         joint_(spec.joint),
-        parameters_({angle_parameter(fmt::format("hyst{}", spec.joint + 1), kHalfWidth),
+        parameters_({{fmt::format("hyst{}", spec.joint + 1), "rad", 1, 0, kHalfWidth, 0.0},
                      {fmt::format("way{}", spec.joint + 1), "rad", 1, kWay, kWaySpread, kShortestWay, true}}) {}
   const CauseRecord& cause() const override { return causes::hysteresis(); }
   std::string name() const override { return name_; }

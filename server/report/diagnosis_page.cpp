@@ -152,9 +152,12 @@ std::string figures_table(const Diagnosis& diagnosis) {
 std::string unexplained_text(const Diagnosis& diagnosis) {
   const Unexplained& left = diagnosis.unexplained;
   if (!left.present) return "";
-  const std::string on = left.depends_on.empty() ? "no joint, torque or time" : circumstances_in_words(left.depends_on);
-  return fmt::format("<p class=\"left\">Unexplained: {} rms. It changes with {} (p{}). No known cause fits.</p>\n",
-                     micrometres(left.rms), html_text(on), p_value_after_p(left.p_value));
+  // A p-value is of what was tested: where nothing was found to depend on, it is that of the noise.
+  const std::string p = fmt::format(" (p{})", p_value_after_p(left.p_value));
+  const bool depends = !left.depends_on.empty();
+  const std::string changes = html_text(what_it_changes_with(left.depends_on)) + (depends ? p : "");
+  return fmt::format("<p class=\"left\">Unexplained: {} rms{}. {} No known cause fits.</p>\n", micrometres(left.rms),
+                     depends ? "" : ", more than the stated noise" + p, as_sentence(changes));
 }
 
 std::string leftover_text(const Diagnosis& diagnosis) {

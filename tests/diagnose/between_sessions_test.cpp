@@ -67,5 +67,78 @@ TEST(BetweenSessions, AReflectorThatSatElsewhereForADayIsToldAndIsNoNoise) {
   EXPECT_LT(diagnosis.noise, 1.15 * good.noise);
 }
 
+/// The robot with a further source, its numbers as given.
+VirtualRobot with_source(VirtualRobot robot, const std::string& source, const std::vector<double>& values) {
+  const Eigen::Index first = add_source(robot.truth, test::demand(make_error_source(source, *robot.truth.cell)));
+  for (std::size_t k = 0; k < values.size(); ++k) robot.truth.values(first + static_cast<Eigen::Index>(k)) = values[k];
+  return robot;
+}
+
+/// The robot whose gearbox at `joint` (1-based) is so many times as soft.
+VirtualRobot softer(VirtualRobot robot, int joint, double times) {
+  const std::vector<Parameter> parameters = robot.truth.parameters();
+  for (std::size_t k = 0; k < parameters.size(); ++k)
+    if (parameters[k].name == fmt::format("C{}", joint)) robot.truth.values(static_cast<Eigen::Index>(k)) *= times;
+  return robot;
+}
+
+/// The robot all of whose links are longer by that share.
+VirtualRobot grown(VirtualRobot robot, double share) {
+  const std::vector<Parameter> parameters = robot.truth.parameters();
+  const Chain& chain = robot.truth.cell->robot;
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    for (int j = 0; j < chain.size(); ++j) {
+      double& value = robot.truth.values(static_cast<Eigen::Index>(k));
+      if (parameters[k].name == fmt::format("d{}", j + 1)) value += share * chain.joint(j).link.d;
+      if (parameters[k].name == fmt::format("a{}", j + 1)) value += share * chain.joint(j).link.a;
+    }
+  }
+  return robot;
+}
+
+bool is_sure(const Diagnosis& diagnosis) {
+  const auto sure = [](const auto& one) { return !one.source.empty() && one.could_also_be.empty(); };
+  return std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(), sure) ||
+         std::any_of(diagnosis.between_sessions.begin(), diagnosis.between_sessions.end(), sure);
+}
+
+/// What no cause of the list does that begins with a session: no name is sure, and what is left is not called noise.
+void expect_no_sure_name(const VirtualRobot& later, std::uint64_t seed) {
+  const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
+  const Diagnosis told = diagnosis_of({robot, later, later}, seed);
+  EXPECT_FALSE(is_sure(told)) << told.sentence;
+  EXPECT_NE(told.verdict, Verdict::kNothing) << told.sentence;
+  EXPECT_NE(told.noise_from.find("alone gives 22.5 um"), std::string::npos) << told.noise_from;
+}
+
+TEST(BetweenSessions, AGearboxThatGotSofterIsNoPayloadForSure) {
+  expect_no_sure_name(softer(test::chapter_5_robot(test::cell_7()), 3, 1.8), 100);
+}
+
+TEST(BetweenSessions, ANewRippleIsNoLostZeroAndNoPayloadForSure) {
+  for (const std::uint64_t seed : {110, 111})
+    expect_no_sure_name(
+        with_source(test::chapter_5_robot(test::cell_7()), "gear_transmission:2@31.7", {31.7, 1.5e-4, 5e-5}), seed);
+}
+
+TEST(BetweenSessions, AWarmArmWithoutAThermometerIsNoOtherToolForSure) {
+  const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
+  for (const std::uint64_t seed : {120, 121}) {
+    const Diagnosis told = diagnosis_of({robot, grown(robot, 1.2e-4), robot}, seed);
+    EXPECT_FALSE(is_sure(told)) << told.sentence;
+  }
+}
+
+TEST(BetweenSessions, ANoisySessionIsNotVouchedForByItself) {
+  const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
+  VirtualRobot noisy = robot;
+  noisy.sigma *= 3;
+  noisy.sigma_rotation *= 3;
+  const Diagnosis told = diagnosis_of({robot, noisy, robot}, 130);
+  EXPECT_TRUE(told.unexplained.present) << told.sentence;
+  EXPECT_NE(told.sentence.find("session day-2 leaves"), std::string::npos) << told.sentence;
+  EXPECT_FALSE(is_sure(told)) << told.sentence;
+}
+
 }  // namespace
 }  // namespace trammel

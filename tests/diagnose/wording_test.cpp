@@ -102,7 +102,8 @@ TEST(Wording, CallsNoiseOnlyWhatTheInstrumentMayDo) {
   EXPECT_EQ(noise_name(70e-6, 9e-6), "what stays unexplained of a pose");
   Diagnosis real = with({});
   real.unexplained = {true, {}, 1.2e-4, 1e-12, "more than noise is left: 4 times"};
-  EXPECT_EQ(sentence_for(real), "More than noise is left: 4 times.");
+  EXPECT_EQ(sentence_for(real),
+            "More than noise is left: 4 times. No single joint, torque or time was found with which it changes.");
 }
 
 TEST(Wording, KnowsWhatWasLookedForByTheOrderOfThePoses) {

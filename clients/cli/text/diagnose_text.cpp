@@ -123,9 +123,11 @@ std::string figures_table(const ordered_json& diagnosis) {
 std::string unexplained_text(const ordered_json& unexplained) {
   if (!unexplained.at("present").get<bool>()) return "";
   const auto on = unexplained.at("depends_on").get<std::vector<std::string>>();
-  return fmt::format("\nUnexplained: {} rms. It changes with {} (p {}).\n", micrometres(unexplained.at("rms_mm")),
-                     on.empty() ? "no joint, torque or time" : circumstances_in_words(on),
-                     p_text(unexplained.at("p_value")));
+  // A p-value is of what was tested: where nothing was found to depend on, it is that of the noise.
+  const std::string p = fmt::format(" (p {})", p_text(unexplained.at("p_value")));
+  return fmt::format("\nUnexplained: {} rms{}. {}\n", micrometres(unexplained.at("rms_mm")),
+                     on.empty() ? ", more than the stated noise" + p : "",
+                     as_sentence(what_it_changes_with(on) + (on.empty() ? "" : p)));
 }
 
 std::string suspects_text(const ordered_json& suspects) {

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "server/diagnose/evidence/effect.h"
-#include "server/diagnose/search/folds.h"
+#include "server/diagnose/search/held_out.h"
 
 namespace trammel::cause_search {
 
@@ -13,18 +13,6 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 constexpr int kFewestHarmonics = 4;  // of a map: the fewest that the search looks for
-
-VectorXd weight_of(const PriorModel& prior_model, const MeasurementBatch& batch) {
-  return LinearProblem(prior_model.model, batch, prior_model.priors, {}).weight();
-}
-
-/// Sum of squares of the poses held out, each predicted from the others, in units of `weight`.
-double held_out_square(const PriorModel& prior_model, const SearchResult& result, const VectorXd& weight) {
-  const LinearProblem problem(prior_model.model, result.batch, prior_model.priors, {});
-  const VectorXd left =
-      Folds(problem, background_columns(problem, result.unnamed)).held_out_residual(problem.residual());
-  return left.cwiseQuotient(problem.weight()).cwiseProduct(weight).squaredNorm();
-}
 
 /// The spellings of a source between which poses held out decide: forms of a cause, fewer harmonics of a map.
 std::vector<std::string> spellings(const std::string& source, const Cell& cell) {
@@ -73,7 +61,7 @@ std::optional<PriorModel> with_other_form(const PriorModel& now, const std::stri
 
 Result<bool> add_in_best_form(SearchResult& result, Accepted& one, const Accepted* poorer) {
   const VectorXd weight = weight_of(result.after, result.batch);
-  double least = held_out_square(result.after, result, weight);
+  double least = held_out_square(result.after, result.batch, result.unnamed, weight);
   PriorModel start = result.after;
   if (poorer != nullptr) remove_from(start, poorer->in_model);
   std::optional<PriorModel> best;
@@ -81,7 +69,7 @@ Result<bool> add_in_best_form(SearchResult& result, Accepted& one, const Accepte
     PriorModel extended = start;
     if (const Status added = add_to(extended, spelling); !added) return tl::make_unexpected(added.error());
     refine(extended, result.batch, result.unnamed);
-    const double square = held_out_square(extended, result, weight);
+    const double square = held_out_square(extended, result.batch, result.unnamed, weight);
     if (square >= least) continue;
     least = square;
     one.in_model = spelling;
@@ -103,13 +91,13 @@ bool choose_form_again(SearchResult& result, const std::string& form, const std:
   if (finding == result.accepted.end() && !own_is_open) return false;
   const VectorXd weight = weight_of(result.after, result.batch);
   const PriorModel now = result.after;
-  double least = held_out_square(now, result, weight);
+  double least = held_out_square(now, result.batch, result.unnamed, weight);
   std::string chosen = form;
   for (const std::string& other : alternatives(cause, *now.model.cell)) {
     if (other == form) continue;
     std::optional<PriorModel> changed = with_other_form(now, form, other, result);
     if (!changed) continue;
-    const double square = held_out_square(*changed, result, weight);
+    const double square = held_out_square(*changed, result.batch, result.unnamed, weight);
     if (square >= least) continue;
     least = square;
     chosen = other;

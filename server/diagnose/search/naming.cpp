@@ -59,6 +59,12 @@ bool is_whole_of(const Cause& whole, const Cause& step) {
   return has_rival(step, whole, {Likeness::kFromTheFirstPose}, true);
 }
 
+causes::Part part_of(const Cause& cause) {
+  const CauseRecord& record = record_of(cause);
+  const causes::Rival* whole = whole_of(record);
+  return whole == nullptr ? record.part : cause_spelled(whole->cause).part;
+}
+
 bool is_description_of(const Cause& general, const Cause& special) {
   if (general.cause == special.cause) {
     if (numbers_are_causes(record_of(general)) && !general.parameter.empty() && !special.parameter.empty())

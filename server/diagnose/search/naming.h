@@ -8,6 +8,9 @@ namespace trammel::cause_search {
 /// step near the first pose looks like it, and is the less likely of the two.
 [[nodiscard]] bool is_whole_of(const Cause& whole, const Cause& step);
 
+/// Which part of the nominal cell the cause corrects; of a step, the part that it corrects from a pose on.
+[[nodiscard]] causes::Part part_of(const Cause& cause);
+
 /// Whether `general` is only a more general description of `special`, not another cause.
 [[nodiscard]] bool is_description_of(const Cause& general, const Cause& special);
 

@@ -1,14 +1,18 @@
 #include "server/diagnose/search/pruning.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "server/diagnose/evidence/background.h"
 #include "server/diagnose/evidence/effect.h"
+#include "server/diagnose/search/folds.h"
+#include "server/diagnose/thresholds.h"
 
 namespace trammel::cause_search {
 
 namespace {
 
+using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
@@ -26,6 +30,56 @@ double evidence_of(const MatrixXd& columns, const Background& rest, const Vector
   return 0.5 * (right.dot(factor.solve(right)) - log_det);
 }
 
+/// By how much less the squares of poses held out are with a cause than without it.
+struct Gain {
+  double gain = 0, without = 0;  // sums over the poses
+  double chance = 0;             // what the gain is uncertain by, one standard deviation
+  [[nodiscard]] bool is_none() const { return gain < thresholds::kLeastGain * without; }
+  [[nodiscard]] bool is_by_chance() const { return gain < thresholds::kGainBeyondChance * chance; }
+};
+
+Gain gain_of(const LinearProblem& problem, const VectorXd& with, const VectorXd& without) {
+  Gain all;
+  double square = 0;
+  for (Index i = 0; i < problem.poses(); ++i) {
+    const Index row = problem.first_row(i);
+    const Index count = problem.row_count(i);
+    const double before = without.segment(row, count).squaredNorm();
+    const double gain = before - with.segment(row, count).squaredNorm();
+    all.gain += gain;
+    all.without += before;
+    square += gain * gain;
+  }
+  all.chance = std::sqrt(square);
+  return all;
+}
+
+std::vector<Index> all_but(Index count, const std::vector<Index>& left_out) {
+  std::vector<Index> kept;
+  for (Index k = 0; k < count; ++k) {
+    if (std::find(left_out.begin(), left_out.end(), k) == left_out.end()) kept.push_back(k);
+  }
+  return kept;
+}
+
+/// The first of the causes that always act with which poses held out are predicted no better. What begins at a pose may
+/// act at few of them.
+std::optional<std::size_t> idle_cause(const SearchResult& result, const LinearProblem& problem, double limit) {
+  const MatrixXd columns = background_columns(problem, result.unnamed);
+  const Folds folds(problem, columns);
+  const VectorXd with = folds.held_out_residual(problem.residual());
+  for (std::size_t k = 0; k < result.accepted.size(); ++k) {
+    const Accepted& one = result.accepted[k];
+    if (one.is_outlier() || record_of(one.cause).lasting != causes::Lasting::kAlways) continue;
+    const std::vector<Index> others = all_but(columns.cols(), places_of_source(problem.model(), one.in_model));
+    const VectorXd whole = problem.residual() + effect_of_source(problem, one.in_model);
+    const Gain gain = gain_of(problem, with, folds.held_out_residual(whole, others));
+    const bool beyond_chance = one.best.evidence > thresholds::kBeyondFolds * limit || !gain.is_by_chance();
+    if (gain.is_none() || !beyond_chance) return k;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::optional<std::size_t> weak_cause(const SearchResult& result, double limit) {
@@ -40,7 +94,7 @@ std::optional<std::size_t> weak_cause(const SearchResult& result, double limit) 
     const double freedom = std::min<double>(one.best.freedom, static_cast<double>(own.size.size()));
     if (!(log_evidence(own.strength(), freedom) - one.penalty >= limit)) return k;
   }
-  return std::nullopt;
+  return idle_cause(result, problem, limit);
 }
 
 std::optional<std::size_t> weak_function(const SearchResult& result, double limit) {

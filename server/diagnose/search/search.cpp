@@ -1,6 +1,7 @@
 #include "server/diagnose/search/search.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "server/diagnose/evidence/effect.h"
 #include "server/diagnose/search/folds.h"
@@ -9,6 +10,7 @@
 #include "server/diagnose/search/pruning.h"
 #include "server/diagnose/search/slow_rival.h"
 #include "server/diagnose/search/standing.h"
+#include "server/diagnose/search/whole_list.h"
 #include "server/diagnose/thresholds.h"
 
 namespace trammel::cause_search {
@@ -36,6 +38,18 @@ void drop_rows(MatrixXd& columns, Index first, Index count) {
   columns = std::move(kept);
 }
 
+/// As the model names the source of a cause that it has: the cause in one of its forms.
+std::string name_in(const PhysicalModel& model, const Cause& cause) {
+  const auto source = std::find_if(model.sources.begin(), model.sources.end(),
+                                   [&](const ErrorSourcePtr& one) { return one->cause().spelling == cause.cause; });
+  return source == model.sources.end() ? to_string(cause) : (*source)->name();
+}
+
+std::vector<Measurement>::const_iterator place_in(const MeasurementBatch& batch, int row) {
+  return std::find_if(batch.measurements.begin(), batch.measurements.end(),
+                      [&](const Measurement& m) { return m.row == row; });
+}
+
 /// Forward and backward selection. Every step leaves `result_` a model that is identified beside all that was found.
 class Search {
  public:
@@ -49,13 +63,17 @@ class Search {
   [[nodiscard]] bool prune();
   /// Chooses the form of each cause in the model anew; false where all stay what they are.
   [[nodiscard]] bool choose_forms_again() { return cause_search::choose_forms_again(result_, own_sources_); }
+  /// Puts a cause of the list in the place of all that has no name; false where none explains it.
+  [[nodiscard]] bool name_functions();
   /// Whether so much was found since the forms were chosen that they may be others.
   [[nodiscard]] bool is_time_for_forms();
   /// Asks of every finding again what it is, all others in place: while they were missing another cause may have looked
   /// more like it.
   [[nodiscard]] Status reconsider();
-  /// Play of the wrong sign becomes a dependence on the side of approach that has no name.
-  void open_negative_play();
+  /// Poses that were out while a cause was missing, and fit now that it is there, come back.
+  void take_back_outliers();
+  /// What has the shape of a cause and a sign that it cannot have becomes a dependence that has no name.
+  [[nodiscard]] Status open_wrong_signs();
   [[nodiscard]] SearchResult take();
 
  private:
@@ -80,8 +98,14 @@ class Search {
   [[nodiscard]] Result<bool> name_again(Accepted& one);
 
   [[nodiscard]] std::vector<Accepted>::iterator known_map(const Cause& cause);
-  [[nodiscard]] PlaySign sign_of(const Accepted& one) const;
-  void make_unnamed(const Accepted& play);
+  /// All numbers of the model and the functions, beside each other.
+  struct Together;
+  [[nodiscard]] bool fits_beside_the_others(const Measurement& pose);
+  [[nodiscard]] PlaySign play_of(const Accepted& one) const;
+  [[nodiscard]] WrongSign sign_of(const Accepted& one) const;
+  [[nodiscard]] bool open_wrong_sign(Accepted& one);
+  [[nodiscard]] Status ask_again_for(const Accepted& one);
+  void make_unnamed(const Accepted& one, const std::vector<std::string>& depends_on);
   void refine_all() { refine(result_.after, result_.batch, result_.unnamed); }
 
   std::shared_ptr<const Cell> cell_;
@@ -92,6 +116,19 @@ class Search {
   std::size_t renewed_for_ = 0;           // how much had been found when chance_ was drawn
   std::size_t formed_for_ = 0;            // the same when the forms were chosen last
   std::vector<Cause> closed_;             // were tried and did not hold
+  std::vector<Accepted> wrong_;           // of them, those whose sign was wrong at the time
+};
+
+struct Search::Together {
+  explicit Together(const SearchResult& result)
+      : problem(result.after.model, result.batch, result.after.priors, {}),
+        all(background_columns(problem, result.unnamed)),
+        change(all.estimate(problem.residual())),
+        covariance(all.covariance()) {}
+  LinearProblem problem;
+  Background all;
+  VectorXd change;
+  MatrixXd covariance;
 };
 
 Status Search::start(const std::vector<std::string>& sources, const MeasurementBatch& batch) {
@@ -313,6 +350,15 @@ Status Search::take_cause(Accepted one) {
     one.p_value = std::min(one.p_value, poorer->p_value);
     result_.accepted.erase(poorer);
   }
+  // Play is opened at the end: its sign is asked pose by pose.
+  const bool is_play = record_of(one.cause).search == causes::SearchFamily::kPlay;
+  if (!is_play && sign_of(one).is_another_cause()) {
+    remove_from(result_.after, one.in_model);
+    refine_all();
+    closed_.push_back(one.cause);
+    wrong_.push_back(std::move(one));
+    return {};
+  }
   result_.accepted.push_back(std::move(one));
   return {};
 }
@@ -347,6 +393,28 @@ bool Search::prune() {
   return weak.has_value();
 }
 
+bool Search::name_functions() {
+  std::optional<NamedInstead> instead = named_instead_of_functions(result_, closed_);
+  if (!instead) return false;
+  result_.after = std::move(instead->model);
+  result_.unnamed.clear();
+  Accepted one;
+  one.cause = instead->cause;
+  one.source = to_string(one.cause);
+  one.in_model = name_in(result_.after.model, one.cause);
+  one.could_also_be = std::move(instead->rivals);
+  const Together now(result_);
+  const OwnEstimate own = own_estimate(now.problem, one.in_model, now.change, now.covariance);
+  one.best.freedom = static_cast<int>(own.size.size());
+  one.best.strength = own.strength();
+  one.best.evidence = log_evidence(one.best.strength, one.best.freedom);
+  const auto penalty = chance_.penalty.find(one.source);
+  one.penalty = penalty == chance_.penalty.end() ? 0 : penalty->second;
+  one.p_value = chance_.p_value(one.best.evidence - one.penalty);
+  result_.accepted.push_back(std::move(one));
+  return true;
+}
+
 Status Search::reconsider() {
   if (result_.accepted.size() < 2) return {};
   for (Accepted& one : result_.accepted) {
@@ -378,39 +446,116 @@ Result<bool> Search::name_again(Accepted& one) {
   return added;
 }
 
-void Search::open_negative_play() {
+void Search::take_back_outliers() {
+  if (!result_.unnamed.empty()) return;  // their functions have no rows for these poses
   for (std::size_t k = 0; k < result_.accepted.size();) {
-    const Accepted one = result_.accepted[k];
-    const bool is_play = record_of(one.cause).search == causes::SearchFamily::kPlay;
-    const std::optional<PlaySign> sign = is_play ? std::optional(sign_of(one)) : std::nullopt;
-    if (!sign || !sign->negative) {
+    const Accepted& one = result_.accepted[k];
+    const auto out = one.is_outlier() ? place_in(result_.all, one.pose.row) : result_.all.measurements.cend();
+    if (out == result_.all.measurements.cend() || !fits_beside_the_others(*out)) {
       ++k;
       continue;
     }
-    make_unnamed(one);
-    result_.negative_play.push_back(*sign);
     result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(k));
-    remove_from(result_.after, one.in_model);
-    refine_all();
   }
 }
 
-/// Of a joint's play, beside all the rest.
-PlaySign Search::sign_of(const Accepted& one) const {
-  const LinearProblem problem(result_.after.model, result_.batch, result_.after.priors, {});
-  const Background all(background_columns(problem, result_.unnamed));
-  return sign_of_play(problem, one.in_model, one.cause.joint, all.estimate(problem.residual()), all.covariance());
+/// Whether the pose, which was out, fits where it is learned from as well; then it is one of the batch again. A pose
+/// that stands alone is where something is largest that is missing, and nothing else says where it should be.
+bool Search::fits_beside_the_others(const Measurement& pose) {
+  MeasurementBatch batch = result_.batch;
+  auto& all = batch.measurements;
+  const auto after =
+      std::find_if(all.begin(), all.end(), [&](const Measurement& m) { return m.context.index > pose.context.index; });
+  const Index at = after - all.begin();
+  all.insert(after, pose);
+  PriorModel with = result_.after;
+  refine(with, batch, {});
+  const LinearProblem problem(with.model, batch, with.priors, {});
+  const VectorXd left = Background(problem.nuisance()).project(problem.residual());
+  const double distance = left.segment(problem.first_row(at), problem.row_count(at)).norm();
+  if (distance > thresholds::kFitsOtherwise) return false;
+  result_.batch = std::move(batch);
+  result_.after = std::move(with);
+  return true;
 }
 
-/// What `play` does to the poses becomes a function of the joint and of the side that it comes from.
-void Search::make_unnamed(const Accepted& play) {
+Status Search::open_wrong_signs() {
+  for (std::size_t k = 0; k < result_.accepted.size();) {
+    Accepted one = result_.accepted[k];
+    const bool opened = !one.is_outlier() && open_wrong_sign(one);
+    result_.accepted[k] = one;
+    if (opened) {
+      result_.accepted.erase(result_.accepted.begin() + static_cast<std::ptrdiff_t>(k));
+      remove_from(result_.after, one.in_model);
+      refine_all();
+    } else {
+      ++k;
+    }
+  }
+  for (const Accepted& one : std::exchange(wrong_, {})) {
+    if (const Status asked = ask_again_for(one); !asked) return asked;
+  }
+  return {};
+}
+
+/// Whether `one`, which is in the model, is another cause by its sign; then it is among what has no name. Where only a
+/// part of it is, it may be something unknown.
+bool Search::open_wrong_sign(Accepted& one) {
+  if (record_of(one.cause).search == causes::SearchFamily::kPlay) {
+    const PlaySign sign = play_of(one);
+    if (!sign.negative) return false;
+    const std::string joint = std::to_string(one.cause.joint + 1);
+    make_unnamed(one, {"q" + joint, "dir" + joint});
+    result_.negative_play.push_back(sign);
+    return true;
+  }
+  const WrongSign sign = sign_of(one);
+  if (sign.is_another_cause()) {
+    make_unnamed(one, sign.depends_on);
+    result_.wrong_signs.push_back(sign);
+    return true;
+  }
+  if (sign.is_beyond_chance()) one.could_also_be.push_back(unknown_cause(one.cause.joint));
+  return false;
+}
+
+/// Whether `one`, which was put away for its sign, is there now that all else is known: with a name or without.
+Status Search::ask_again_for(const Accepted& one) {
+  if (!add_to(result_.after, one.in_model)) return {};  // another form of it is in the model
+  refine_all();
+  const Together now(result_);
+  const OwnEstimate own = own_estimate(now.problem, one.in_model, now.change, now.covariance);
+  const double freedom = std::min<double>(one.best.freedom, static_cast<double>(own.size.size()));
+  Accepted again = one;
+  const bool is_there = log_evidence(own.strength(), freedom) - one.penalty >= chance_.limit;
+  if (is_there && !open_wrong_sign(again)) {
+    result_.accepted.push_back(std::move(again));
+    return {};
+  }
+  remove_from(result_.after, one.in_model);
+  refine_all();
+  return {};
+}
+
+/// Of a joint's play, beside all the rest.
+PlaySign Search::play_of(const Accepted& one) const {
+  const Together now(result_);
+  return sign_of_play(now.problem, one.in_model, one.cause.joint, now.change, now.covariance);
+}
+
+/// Of the numbers of any other cause.
+WrongSign Search::sign_of(const Accepted& one) const {
+  const Together now(result_);
+  return wrong_sign_of(now.problem, one.in_model, one.cause, now.change, now.covariance);
+}
+
+/// What `one` does to the poses becomes a function that has no name.
+void Search::make_unnamed(const Accepted& one, const std::vector<std::string>& depends_on) {
   const LinearProblem problem(result_.after.model, result_.batch, result_.after.priors, {});
-  const std::vector<Index> places = places_of_source(problem.model(), play.in_model);
-  const std::string joint = std::to_string(play.cause.joint + 1);
-  result_.unnamed.push_back({{"q" + joint, "dir" + joint},
+  const std::vector<Index> places = places_of_source(problem.model(), one.in_model);
+  result_.unnamed.push_back({depends_on,
                              problem.weight().cwiseInverse().asDiagonal() * problem.nuisance()(Eigen::all, places),
-                             play.best.evidence - play.penalty,
-                             play.p_value});
+                             one.best.evidence - one.penalty, one.p_value});
 }
 
 SearchResult Search::take() {
@@ -424,10 +569,8 @@ SearchResult Search::take() {
   }
   // Of the pose itself nothing was learned, and by now all else is known.
   for (Accepted& one : result_.accepted) {
-    const auto& poses = result_.all.measurements;
-    const auto pose =
-        std::find_if(poses.begin(), poses.end(), [&](const Measurement& m) { return m.row == one.pose.row; });
-    if (one.is_outlier() && pose != poses.end())
+    const auto pose = place_in(result_.all, one.pose.row);
+    if (one.is_outlier() && pose != result_.all.measurements.end())
       one.pose.distance = (pose->p_W - result_.after.model.pose_W(pose->context).translation()).norm();
   }
   result_.chance = std::move(chance_);
@@ -448,9 +591,11 @@ Result<SearchResult> search_causes(const std::shared_ptr<const Cell>& cell, cons
     if (!more) return tl::make_unexpected(more.error());
     changed = *more || search.prune();
     if (!changed || search.is_time_for_forms()) changed = search.choose_forms_again() || changed;
+    if (!changed) changed = search.name_functions();
   }
+  search.take_back_outliers();
   if (const Status again = search.reconsider(); !again) return tl::make_unexpected(again.error());
-  search.open_negative_play();
+  if (const Status opened = search.open_wrong_signs(); !opened) return tl::make_unexpected(opened.error());
   return search.take();
 }
 

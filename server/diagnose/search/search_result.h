@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "server/diagnose/evidence/bounds.h"
 #include "server/diagnose/evidence/play_sign.h"
 #include "server/diagnose/evidence/refine.h"
 #include "server/diagnose/search/scan.h"
@@ -39,6 +40,8 @@ struct SearchResult {
   std::vector<Unnamed> unnamed;
   /// Joints whose `backlash` came out with the sign that play cannot have: among the unnamed, not among the accepted.
   std::vector<PlaySign> negative_play;
+  /// The same of other causes with numbers beyond their bounds.
+  std::vector<WrongSign> wrong_signs;
   Chance chance;
   std::vector<Reformed> reformed;
   bool too_many_outliers = false;  ///< more poses are out than may be; the rest stayed in

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "server/diagnose/search/naming.h"
 #include "server/diagnose/thresholds.h"
 #include "server/numerics/product.h"
 
@@ -124,7 +125,7 @@ std::vector<std::string> depending(int joint, bool on_temperature) {
 }
 
 std::string wanderer_of(const Cause& cause) {
-  switch (record_of(cause).part) {
+  switch (part_of(cause)) {
     case causes::Part::kTool:
       return "the tool";
     case causes::Part::kPayload:

@@ -15,7 +15,9 @@
 #include "server/diagnose/tell/findings.h"
 #include "server/diagnose/tell/next_poses.h"
 #include "server/diagnose/tell/separability.h"
+#include "server/diagnose/tell/slow_change.h"
 #include "server/diagnose/tell/wording.h"
+#include "server/diagnose/thresholds.h"
 
 namespace trammel::cause_search {
 
@@ -49,18 +51,6 @@ std::vector<const CauseRecord*> examples() {
   return all;
 }
 
-/// For people; empty where nothing does.
-std::string what_moves_slowly(const std::vector<Unnamed>& unnamed, const Surrogates& unrecorded) {
-  std::vector<std::string> wanderers;
-  for (const Unnamed& one : unnamed) {
-    if (!one.wanderer.empty() && std::find(wanderers.begin(), wanderers.end(), one.wanderer) == wanderers.end())
-      wanderers.push_back(one.wanderer);
-  }
-  if (wanderers.empty()) return "";
-  return fmt::format("{} moved slowly while the batch was measured, as parts do that warm up; {}",
-                     fmt::join(wanderers, " and "), what_slow_changes_need(unrecorded));
-}
-
 Unexplained unexplained_of(const SearchResult& found, const LinearProblem& problem, const Background& all,
                            const Surrogates& unrecorded) {
   if (found.unnamed.empty()) return {};
@@ -78,7 +68,9 @@ Unexplained unexplained_of(const SearchResult& found, const LinearProblem& probl
                                     [](const Accepted& one) { return is_play(one.cause); });
     unexplained.hint = what_negative_play_may_be(found.negative_play, every);
   }
-  const std::string slow = what_moves_slowly(found.unnamed, unrecorded);
+  for (const WrongSign& one : found.wrong_signs)
+    unexplained.hint += (unexplained.hint.empty() ? "" : "; ") + what_wrong_sign_means(one);
+  const std::string slow = what_moves(found, problem, all, unrecorded);
   unexplained.hint += (unexplained.hint.empty() || slow.empty() ? "" : ". ") + slow;
   const Index P = problem.nuisance().cols();
   const VectorXd numbers = all.estimate(problem.residual());
@@ -262,6 +254,14 @@ void tell_next_poses(const Explained& explained, const DiagnoseOptions& options,
 void tell_left_over(const Explained& explained, std::uint64_t seed, Diagnosis& diagnosis) {
   const VectorXd left = explained.all.project(explained.after.residual());
   diagnosis.leftover = dependence_of(explained.after, explained.all, left, seed);
+  Unexplained& unexplained = diagnosis.unexplained;
+  if (!unexplained.present || !unexplained.depends_on.empty()) return;
+  for (const Dependence& one : diagnosis.leftover) {  // the surest first
+    if (one.p_value > thresholds::kChangesWith) break;
+    if (unexplained.depends_on.empty()) unexplained.p_value = one.p_value;
+    auto& on = unexplained.depends_on;
+    if (std::find(on.begin(), on.end(), one.on) == on.end()) on.push_back(one.on);
+  }
 }
 
 void tell_recovery(const Explained& explained, const std::vector<FamilyPtr>& families, std::uint64_t seed,

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "server/calibrate/sessions/session_setting.h"
 #include "server/diagnose/diagnose_options.h"
 #include "server/diagnose/search/search_result.h"
 #include "server/diagnose/search/surrogates.h"
@@ -16,8 +17,9 @@ namespace trammel::cause_search {
 struct PreparedBatch {
   MeasurementBatch train, validation;  ///< in the order of measuring; repeats of the one merged
   RepeatStatistics repeats;
-  Surrogates surrogates;  ///< what was put in for what nobody recorded
-  bool sorted = false;    ///< rows had to be moved into the order of their times
+  Surrogates surrogates;                 ///< what was put in for what nobody recorded
+  std::vector<SessionSetting> sessions;  ///< of several: with the noise of each that its repeated poses show
+  bool sorted = false;                   ///< rows had to be moved into the order of their times
 };
 
 /// What was found, about the poses that were searched: everything that is told is read from here. Before and after are

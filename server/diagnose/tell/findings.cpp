@@ -143,6 +143,7 @@ class Findings {
 
  private:
   [[nodiscard]] Finding outlier(const Accepted& one) const;
+  [[nodiscard]] bool is_beyond_others(const Accepted& one) const;
   [[nodiscard]] Finding cause(const Accepted& one) const;
   /// As it is told: by one number only where that is alone.
   [[nodiscard]] Cause named(const Accepted& one) const;
@@ -157,6 +158,7 @@ class Findings {
   [[nodiscard]] const Family* step_family(const Accepted& one) const;
 
   const LinearProblem& problem_;
+  const MeasurementBatch& all_;  // with the poses that are out
   const Surrogates& surrogates_;
   std::vector<Cause> causes_;
   double limit_;  // nat: the line of a finding
@@ -184,6 +186,7 @@ bool begins(const Accepted& one) { return !one.is_outlier() && !one.cause.pose_i
 Findings::Findings(const SearchResult& found, const LinearProblem& problem, const Unexplained& unexplained,
                    const Surrogates& surrogates, const MeasurementBatch& recorded, const Remainder& remainder)
     : problem_(problem),
+      all_(found.all),
       surrogates_(surrogates),
       causes_(causes_of(found.accepted)),
       limit_(found.chance.limit),
@@ -197,6 +200,12 @@ Findings::Findings(const SearchResult& found, const LinearProblem& problem, cons
 
 Finding Findings::outlier(const Accepted& one) const {
   const ErrorFigures held_out = figures_of(problem_.positions(held_out_));
+  std::vector<Cause> could_also_be;
+  if (beside_.more_than_noise && is_beyond_others(one)) could_also_be.push_back(unknown_cause());
+  std::string action =
+      could_also_be.empty()
+          ? action_for(one.cause, {})
+          : "measure it again, and more poses near it: what the simulation lacks is largest at the edge";
   return {.cause = one.cause,
           .parameters = {{"distance", "mm", to_mm(one.pose.distance), to_mm(kExpanded * problem_.noise())}},
           .effect_rms = one.pose.distance,
@@ -204,7 +213,23 @@ Finding Findings::outlier(const Accepted& one) const {
           .held_out_after = held_out,
           .strength = one.best.strength,
           .p_value = one.p_value,
-          .action = action_for(one.cause, {})};
+          .could_also_be = std::move(could_also_be),
+          .action = std::move(action)};
+}
+
+/// Whether the pose lies beyond all others in some joint, where nothing says what the arm does.
+bool Findings::is_beyond_others(const Accepted& one) const {
+  const auto& all = all_.measurements;
+  const auto out = std::find_if(all.begin(), all.end(), [&](const Measurement& m) { return m.row == one.pose.row; });
+  if (out == all.end()) return false;
+  JointVector low = problem_.batch().measurements.front().context.q;
+  JointVector high = low;
+  for (const Measurement& m : problem_.batch().measurements) {
+    low = low.cwiseMin(m.context.q);
+    high = high.cwiseMax(m.context.q);
+  }
+  const JointVector margin = thresholds::kBeyondOthers * (high - low);
+  return ((out->context.q - high - margin).array() > 0).any() || ((low - margin - out->context.q).array() > 0).any();
 }
 
 Cause Findings::named(const Accepted& one) const {

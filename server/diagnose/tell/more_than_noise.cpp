@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/diagnose/tell/between_sessions.h"
 #include "server/diagnose/tell/wording.h"
 #include "server/diagnose/thresholds.h"
 
@@ -61,6 +62,22 @@ std::string what_shows_more(const PreparedBatch& prepared, const LeftOver& posit
       micrometres(prepared.repeats.sigma), with_what_was_not_recorded(prepared.surrogates));
 }
 
+/// The sessions that leave more than noise.
+std::vector<LeftBySession> sessions_beyond_noise(const Explained& explained, const PreparedBatch& prepared) {
+  std::vector<LeftBySession> sessions = left_by_session(explained.after, explained.all, prepared.sessions);
+  std::erase_if(sessions,
+                [](const LeftBySession& one) { return judge_noise(one.left) != NoiseVerdict::kMoreThanNoise; });
+  return sessions;
+}
+
+/// "session day-2 leaves 1.8 times the stated noise": those of several sessions; empty where none does.
+std::string said_of_sessions(const std::vector<LeftBySession>& beyond) {
+  std::vector<std::string> all;
+  for (const LeftBySession& one : beyond)
+    all.push_back(fmt::format("session {} leaves {:.1f} times the stated noise", one.id, ratio_of(one.left)));
+  return fmt::format("{}", fmt::join(all, ", "));
+}
+
 /// m, of the three axes: what is left beyond what is stated.
 double rms_beyond(const LeftOver& left) {
   return std::sqrt(3 * std::max(0.0, left.left * left.left - left.stated * left.stated));
@@ -88,15 +105,17 @@ double chance_of_noise(const LeftOver& left) {
   return std::max(kLeastPValue, 0.5 * std::erfc(deviations(left) / std::sqrt(2.0)));
 }
 
-bool leaves_more_than_noise(const LinearProblem& after, const RepeatStatistics& repeats) {
+bool leaves_more_than_noise(const Explained& explained, const PreparedBatch& prepared) {
+  const LinearProblem& after = explained.after;
+  const RepeatStatistics& repeats = prepared.repeats;
   const LeftOver position = left_of(after.position_spread());
   const bool measured = repeats.degrees_of_freedom > 0 && repeats.sigma > thresholds::kMoreThanNoise * position.stated;
-  return !measured &&
-         std::max(judge_noise(position), judge_noise(left_of(after.rotation_spread()))) == NoiseVerdict::kMoreThanNoise;
+  const NoiseVerdict worst = std::max(judge_noise(position), judge_noise(left_of(after.rotation_spread())));
+  return !measured && (worst == NoiseVerdict::kMoreThanNoise || !sessions_beyond_noise(explained, prepared).empty());
 }
 
 Remainder remainder_of(const Explained& explained, const PreparedBatch& prepared, const Diagnosis& diagnosis) {
-  const bool more = !explained.found.unnamed.empty() || leaves_more_than_noise(explained.after, prepared.repeats) ||
+  const bool more = !explained.found.unnamed.empty() || leaves_more_than_noise(explained, prepared) ||
                     is_worse_held_out(prepared, diagnosis);
   return {more, more ? rms_beyond(left_of(explained.after.position_spread())) : 0};
 }
@@ -104,15 +123,17 @@ Remainder remainder_of(const Explained& explained, const PreparedBatch& prepared
 void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis) {
   const LeftOver position = diagnosis.left_position = left_of(explained.after.position_spread());
   const LeftOver rotation = diagnosis.left_rotation = left_of(explained.after.rotation_spread());
+  const std::vector<LeftBySession> beyond = sessions_beyond_noise(explained, prepared);
   const NoiseVerdict worst = std::max(judge_noise(position), judge_noise(rotation));
-  if (worst == NoiseVerdict::kAsStated) return;
+  if (worst == NoiseVerdict::kAsStated && beyond.empty()) return;
   const std::string more = what_shows_more(prepared, position);
-  if (worst == NoiseVerdict::kLarger) {
+  if (worst != NoiseVerdict::kMoreThanNoise && beyond.empty()) {
     diagnosis.limits.push_back(fmt::format("a little more than noise: what is left is {}; {}",
                                            figures(position, rotation, NoiseVerdict::kLarger), more));
     return;
   }
-  const std::string what = figures(position, rotation, NoiseVerdict::kMoreThanNoise);
+  std::string what = figures(position, rotation, NoiseVerdict::kMoreThanNoise);
+  if (!beyond.empty()) what += (what.empty() ? "" : "; ") + said_of_sessions(beyond);
   Unexplained& unexplained = diagnosis.unexplained;
   if (unexplained.present) {
     diagnosis.limits.push_back(fmt::format("more than noise, what is unexplained included: {}; {}", what, more));
@@ -121,8 +142,11 @@ void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagn
   unexplained.present = true;
   unexplained.rms = rms_beyond(position);
   unexplained.p_value = std::min(chance_of_noise(position), chance_of_noise(rotation));
-  unexplained.hint =
-      fmt::format("more than noise is left: {}. It changes with no joint, torque or time. {}", what, as_sentence(more));
+  for (const LeftBySession& one : beyond) {
+    unexplained.rms = std::max(unexplained.rms, rms_beyond(one.left));
+    unexplained.p_value = std::min(unexplained.p_value, chance_of_noise(one.left));
+  }
+  unexplained.hint = fmt::format("more than noise is left: {}. {}", what, as_sentence(more));
 }
 
 }  // namespace trammel::cause_search

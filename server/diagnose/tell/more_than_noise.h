@@ -22,9 +22,9 @@ enum class NoiseVerdict {
 /// Chance of as much or more; not below 1e-6.
 [[nodiscard]] double chance_of_noise(const LeftOver& left);
 
-/// Whether what the extended model leaves is more than noise, and not that of the measurement: poses measured
-/// repeatedly do not scatter as much.
-[[nodiscard]] bool leaves_more_than_noise(const LinearProblem& after, const RepeatStatistics& repeats);
+/// Whether what the extended model leaves, of all poses or of one session, is more than noise, and not that of the
+/// measurement: poses measured repeatedly do not scatter as much.
+[[nodiscard]] bool leaves_more_than_noise(const Explained& explained, const PreparedBatch& prepared);
 
 /// What is left beside all that has a name. It is more than noise where
 /// - something was found that has no name;

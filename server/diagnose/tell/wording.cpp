@@ -149,6 +149,15 @@ std::vector<std::string> clauses_of(const std::vector<const Finding*>& findings,
 std::string bad_poses_said(const std::vector<const Finding*>& findings) {
   std::vector<std::string> poses;
   for (const Finding* finding : findings) poses.push_back(said(*finding));
+  const bool may_be_missing = std::any_of(findings.begin(), findings.end(),
+                                          [](const Finding* finding) { return !finding->could_also_be.empty(); });
+  if (may_be_missing)
+    return listed(poses) + (poses.size() > 1 ? " fit none of the others: bad measurements, or poses at which something "
+                                               "is large that the simulation lacks: measure them and their neighbours "
+                                               "again"
+                                             : " fits none of the others: a bad measurement, or a pose at which "
+                                               "something is large that the simulation lacks: measure it and its "
+                                               "neighbours again");
   return listed(poses) + (poses.size() > 1
                               ? " fit none of the others, and single poses do not tell why: measure them and their "
                                 "neighbours again"
@@ -210,6 +219,11 @@ std::string circumstances_in_words(const std::vector<std::string>& on) {
   return others.size() == 2 && joints.size() > 1 ? others[0] + ", and " + others[1] : listed(others);
 }
 
+std::string what_it_changes_with(const std::vector<std::string>& on) {
+  if (on.empty()) return "no single joint, torque or time was found with which it changes";
+  return "it changes with " + circumstances_in_words(on);
+}
+
 std::string sentence_for(const Diagnosis& d) {
   const Told all = told(d.findings);
   const bool found = !all.sure.empty() || !all.parts.empty() || !all.doubtful.empty();
@@ -226,6 +240,7 @@ std::string sentence_for(const Diagnosis& d) {
   if (!all.bad_poses.empty()) add(bad_poses_said(all.bad_poses));
   add(unexplained_said(d.unexplained, found || !all.bad_poses.empty()));
   add(d.unexplained.hint);
+  if (d.unexplained.present && d.unexplained.depends_on.empty()) add(what_it_changes_with({}));
   add(held_out_said(d.suspects));
   if (!found && !d.unexplained.present)
     add(fmt::format("Nothing {} found in {} poses: {:.0f} um rms are left, which looks like noise",

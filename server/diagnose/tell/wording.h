@@ -18,6 +18,9 @@ namespace trammel {
 [[nodiscard]] std::string what_slow_changes_need(const cause_search::Surrogates& unrecorded);
 /// Of what changes with the circumstances `q2`, `q3`, `time`: `the positions of joints 2 and 3, and time`.
 [[nodiscard]] std::string circumstances_in_words(const std::vector<std::string>& on);
+/// What was found that the unexplained depends on, as a clause. That nothing was found is no proof that nothing is
+/// there.
+[[nodiscard]] std::string what_it_changes_with(const std::vector<std::string>& on);
 /// Whether the batch shows nothing at all of the cause, which is then not worth telling from others.
 [[nodiscard]] bool is_never_shown(const Diagnosis& diagnosis, const Cause& cause);
 /// What `noise` is of, m per axis: one measurement, or more than what is stated for the `instrument`.

@@ -1,0 +1,88 @@
+#include "server/diagnose/search/whole_list.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "server/diagnose/diagnose.h"
+#include "server/plan/plan.h"
+#include "server/simulate/simulate.h"
+#include "tests/support/demand.h"
+#include "tests/support/temporary_folder.h"
+
+// What the whole list explains, link geometry included, is not unknown.
+
+namespace trammel {
+namespace {
+
+/// A robot on a rail of which only the place of the base is identified.
+std::shared_ptr<const Cell> cell_on_rail() {
+  const test::TemporaryFolder folder;
+  const std::string text = fmt::format(
+      "version: 1\ncell: on-rail\nrobot: {}/models/abb_irb6640-205-275-on-rail.yaml\n"
+      "base: {{xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, 0]}}\n"
+      "tools: {{probe: {{xyz_mm: [60, 0, 140], q_wxyz: [1, 0, 0, 0]}}}}\ntracker: {{sigma_mm: 0.03}}\n"
+      "model: {{error_sources: [base], bias: none}}\n",
+      TRAMMEL_SOURCE_DIR);
+  return std::make_shared<const Cell>(test::demand(read_cell(folder.write("cell.yaml", text))));
+}
+
+/// The rail runs so many rad off its drawn direction.
+Diagnosis diagnosed(double sideways, double upwards, std::uint64_t seed) {
+  const auto cell = cell_on_rail();
+  VirtualRobot robot{test::demand(make_physical_model(cell, {"geometry"})), 30e-6, 0, {}};
+  const std::vector<Parameter> parameters = robot.truth.parameters();
+  for (std::size_t k = 0; k < parameters.size(); ++k) {
+    if (parameters[k].name == "theta1") robot.truth.values(static_cast<Eigen::Index>(k)) = sideways;
+    if (parameters[k].name == "alpha1") robot.truth.values(static_cast<Eigen::Index>(k)) = upwards;
+  }
+  SimulateOptions options;
+  options.seed = seed;
+  options.orientation = false;
+  const MeasurementBatch batch = test::demand(simulate(robot, test::demand(plan_poses(*cell, {80, seed})), options));
+  DiagnoseOptions quick;
+  quick.draws = 200;
+  quick.next_poses = 0;
+  quick.recovery = false;
+  return test::demand(diagnose(cell, test::demand(check_against_cell(batch, *cell)), quick));
+}
+
+TEST(WholeList, ARailThatRunsOffItsDrawnDirectionIsLinkGeometry) {
+  for (const std::uint64_t seed : {1, 2}) {
+    const Diagnosis found = diagnosed(1.2e-3, 0.8e-3, seed);
+    EXPECT_TRUE(std::any_of(found.findings.begin(), found.findings.end(), [](const Finding& one) {
+      return one.cause.cause == "geometry";
+    })) << found.sentence;
+    EXPECT_FALSE(found.unexplained.present) << found.sentence;
+    EXPECT_LT(found.after.rms, 70e-6) << found.sentence;
+    EXPECT_EQ(found.sentence.find("no known cause"), std::string::npos) << found.sentence;
+  }
+}
+
+TEST(WholeList, AWristCouplingTooLargeForADerivativeIsFound) {
+  const test::TemporaryFolder folder;
+  const std::string text = fmt::format(
+      "version: 1\ncell: wrist\nrobot: {}/models/yaskawa_gp25.yaml\nbase: null\ntools: {{t1: null}}\n"
+      "tracker: {{sigma_mm: 0.03}}\nmodel: {{error_sources: [base, tool, geometry], bias: none}}\n",
+      TRAMMEL_SOURCE_DIR);
+  const auto cell = std::make_shared<const Cell>(test::demand(read_cell(folder.write("cell.yaml", text))));
+  VirtualRobot robot{test::demand(make_physical_model(cell, {"wrist_coupling"})), 30e-6, 0, {}};
+  robot.truth.tools.at("t1").translation() = Vector3(0.12, 0.03, 0.2);
+  robot.truth.values(2) = -1.0 / 50;  // joint 6 follows joint 5
+  SimulateOptions options;
+  options.orientation = false;
+  const MeasurementBatch batch = test::demand(simulate(robot, test::demand(plan_poses(*cell, {80, 3})), options));
+  DiagnoseOptions quick;
+  quick.draws = 200;
+  quick.next_poses = 0;
+  quick.recovery = false;
+  const Diagnosis found = test::demand(diagnose(cell, test::demand(check_against_cell(batch, *cell)), quick));
+  ASSERT_FALSE(found.findings.empty()) << found.sentence;
+  const Finding& one = found.findings.front();
+  const auto is_coupling = [](const Cause& cause) { return cause.cause == "wrist_coupling"; };
+  EXPECT_TRUE(is_coupling(one.cause) || std::any_of(one.could_also_be.begin(), one.could_also_be.end(), is_coupling))
+      << found.sentence;
+}
+
+}  // namespace
+}  // namespace trammel
