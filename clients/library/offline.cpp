@@ -11,6 +11,7 @@
 #include "server/base/unix_time.h"
 #include "server/compensate/known_rows.h"
 #include "server/compensate/model_file.h"
+#include "server/compensate/model_guards.h"
 #include "server/compensate/model_notes.h"
 #include "server/compensate/model_spec.h"
 #include "server/compensate/world.h"
@@ -290,6 +291,13 @@ std::vector<double> Model::parameter_covariance() const {
 Evaluation Model::figures() const {
   const auto& parts = inside_->model.parts();
   return evaluation_of(parts.validation.value_or(parts.training));
+}
+
+std::vector<Note> Model::guards() const {
+  std::vector<Note> all;
+  for (const trammel::Note& guard : guards_of(inside_->model))
+    all.push_back({guard.code, to_string(guard.severity), guard.text});
+  return all;
 }
 
 Result<std::vector<Prediction>> Model::predict(std::span<const double> joints_deg, const Context& context) const {

@@ -319,6 +319,12 @@ py::list parameters_of(const api::Model& model) {
   });
 }
 
+py::list guards_of(const api::Model& model) {
+  return texts(model.guards(), [](const api::Note& note) {
+    return py::dict("code"_a = note.code, "severity"_a = note.severity, "text"_a = note.text);
+  });
+}
+
 py::array_t<double> covariance_of(const api::Model& model) {
   const std::vector<double> flat = model.parameter_covariance();
   const auto size = static_cast<py::ssize_t>(model.parameters().size());
@@ -348,7 +354,8 @@ void add_model_file(py::class_<api::Model>& type) {
       .def("bias", &api::Model::bias)
       .def("parameters", &parameters_of)
       .def("parameter_covariance", &covariance_of)
-      .def("figures", [](const api::Model& model) { return to_python(model.figures()); });
+      .def("figures", [](const api::Model& model) { return to_python(model.figures()); })
+      .def("guards", &guards_of);
 }
 
 void add_model_work(py::class_<api::Model>& type) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/compensate/model_guards.h"
 #include "server/compensate/paired_gain.h"
 #include "server/compensate/session_changes.h"
 #include "server/error_sources/anchors.h"
@@ -205,6 +206,7 @@ void add_too_few_poses(const CompensatedModel::Parts& parts, std::vector<std::st
 
 std::vector<std::string> notes_of(const CompensatedModel& model) {
   std::vector<std::string> notes;
+  for (const Note& guard : guards_of(model)) notes.push_back(guard.text);
   add_too_few_poses(model.parts(), notes);
   add_changes(model, notes);
   add_sessions(model.parts(), notes);

@@ -8,8 +8,8 @@
 
 namespace trammel {
 
-/// What a user of the model should know, one sentence each: error sources without effect, a bias that was learned with
-/// a tool that has moved since.
+/// What a user of the model should know, one sentence each: first what guards_of() says, then error sources without
+/// effect, a bias that was learned with a tool that has moved since.
 [[nodiscard]] std::vector<std::string> notes_of(const CompensatedModel& model);
 
 /// `the bias does not help here: 0.0233 mm with it, 0.0229 mm without on 1000 poses`, where poses that were not trained

@@ -4,6 +4,7 @@
 
 #include "server/base/coverage.h"
 #include "server/base/units.h"
+#include "server/compensate/model_guards.h"
 #include "server/compensate/model_notes.h"
 #include "server/compensate/residual_structure.h"
 #include "server/error_sources/cause_words.h"
@@ -357,6 +358,17 @@ ordered_json provenance_json(const CompensatedModel& model) {
 
 }  // namespace
 
+namespace {
+
+ordered_json guards_json(const CompensatedModel& model) {
+  ordered_json list = ordered_json::array();
+  for (const Note& guard : guards_of(model))
+    list.push_back({{"code", guard.code}, {"severity", to_string(guard.severity)}, {"text", guard.text}});
+  return list;
+}
+
+}  // namespace
+
 ordered_json model_json(const CompensatedModel& model) {
   const CompensatedModel::Parts& parts = model.parts();
   ordered_json json = provenance_json(model);
@@ -370,6 +382,7 @@ ordered_json model_json(const CompensatedModel& model) {
   json["not_identifiable"] = unidentifiable_json(parts.unidentifiable);
   json["training"] = evaluation_json(parts.training);
   if (const std::vector<std::string> notes = notes_of(model); !notes.empty()) json["notes"] = notes;
+  if (ordered_json guards = guards_json(model); !guards.empty()) json["guards"] = std::move(guards);
   if (!parts.sessions.empty()) json["sessions"] = sessions_json(parts);
   if (!parts.sessions.empty()) json["order_of_sessions"] = parts.sessions_as_given ? "as_given" : "by_time";
   if (!parts.sessions.empty()) json["between_sessions"] = session_changes_json(session_changes(model));

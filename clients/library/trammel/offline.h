@@ -139,6 +139,8 @@ class TRAMMEL_API Model {
   [[nodiscard]] std::vector<double> parameter_covariance() const;
   /// Errors on poses held out from training, else on the training poses.
   [[nodiscard]] Evaluation figures() const;
+  /// What speaks against trusting the model, the gravest first; empty: nothing does.
+  [[nodiscard]] std::vector<Note> guards() const;
 
   /// The error to expect at N joint vectors, given one after the other (N x n values, deg; of a rail mm). Refuses
   /// joints beyond the robot's limits, numbers that are not finite, and a tool with a payload that no training pose

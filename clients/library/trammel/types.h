@@ -72,6 +72,13 @@ struct ModelFacts {
   bool in_force = false;   ///< of a service: whether its cell is served with it
 };
 
+/// What speaks against trusting a model, in the words of the command line and of the service.
+struct Note {
+  std::string code;      ///< for programs: `left_beyond_sigma`
+  std::string severity;  ///< `note`; `leads`: figures mean less than they seem to; `holds`: a person must look first
+  std::string text;      ///< for people
+};
+
 /// Told what is being done and which share of it is done, [0, 1]. Returns false to give up (kBusy).
 using Progress = std::function<bool(const std::string& stage, double share)>;
 

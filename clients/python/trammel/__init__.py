@@ -348,6 +348,11 @@ class Model:
         """Errors on poses held out from training, else on the training poses, as `evaluate()` returns them."""
         return self._inside.figures()
 
+    @property
+    def guards(self) -> List[Dict[str, Any]]:
+        """What speaks against trusting the model, the gravest first: `code`, `severity` (`note`, `leads`, `holds`), `text`."""
+        return self._inside.guards()
+
     def predict(self, joints_deg: Table, tool: str = "", payload: str = "", directions: Sequence[int] = (),
                 temperature_c: Optional[float] = None) -> Predictions:
         """The error to expect at `joints_deg` (N, n) or (n,), deg, of rails mm; or a pandas frame with `q1_deg ...`.

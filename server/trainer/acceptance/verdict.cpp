@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/base/units.h"
+#include "server/compensate/model_guards.h"
 
 namespace trammel {
 
@@ -51,6 +52,20 @@ GateVerdict judge_by_record(const CompensatedModel& candidate, const RecordInFor
   return {false, "not in force: " + why + "; activate it if it is wanted", false, why, {{}, rms, limit}};
 }
 
+/// The same verdict, but a model that a guard holds waits for a person.
+GateVerdict held_by_guards(const CompensatedModel& candidate, GateVerdict verdict) {
+  if (!verdict.put_in_force) return verdict;
+  for (const Note& guard : guards_of(candidate)) {
+    if (guard.severity != Severity::kHolds) continue;
+    verdict.put_in_force = false;
+    verdict.undecided = true;
+    verdict.why = guard.text;
+    verdict.message = "not in force: " + guard.text + "; activate it if it is wanted";
+    return verdict;
+  }
+  return verdict;
+}
+
 }  // namespace
 
 GateVerdict verdict_on(const CompensatedModel& candidate, const ServedModel* in_force,
@@ -59,8 +74,9 @@ GateVerdict verdict_on(const CompensatedModel& candidate, const ServedModel* in_
   GateQuestion question{candidate, in_force, std::move(served_before), sessions, 0};
   if (in_force != nullptr) question.first_new = first_new(sessions, in_force->model);
   GateVerdict verdict = judge(question, options);
-  if (!verdict.put_in_force || !record) return verdict;
-  return judge_by_record(candidate, *record, sessions, options.accept_ratio, std::move(verdict));
+  if (verdict.put_in_force && record)
+    verdict = judge_by_record(candidate, *record, sessions, options.accept_ratio, std::move(verdict));
+  return held_by_guards(candidate, std::move(verdict));
 }
 
 }  // namespace trammel
