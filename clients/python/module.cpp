@@ -393,13 +393,14 @@ void add_work(py::module_& m) {
   m.def(
       "train",
       [](const api::Cell& cell, const std::vector<api::Batch>& batches, std::optional<std::string> level,
-         std::optional<std::string> bias, std::uint64_t seed, double validation_share, const py::object& progress) {
+         std::optional<std::string> bias, std::uint64_t seed, double validation_share, const py::object& progress,
+         bool as_read) {
         return told_of(progress, [&](api::Progress told) {
           return api::train(cell, batches,
-                            {std::move(level), std::move(bias), seed, validation_share, std::move(told)});
+                            {std::move(level), std::move(bias), seed, validation_share, std::move(told), as_read});
         });
       },
-      "cell"_a, "batches"_a, "level"_a, "bias"_a, "seed"_a, "validation_share"_a, "progress"_a);
+      "cell"_a, "batches"_a, "level"_a, "bias"_a, "seed"_a, "validation_share"_a, "progress"_a, "as_read"_a);
   m.def(
       "diagnose",
       [](const api::Cell& cell, const std::vector<api::Batch>& batches, std::uint64_t seed,
