@@ -24,6 +24,7 @@
 #include "server/report/diagnosis_json.h"
 #include "server/robot/inverse_kinematics.h"
 #include "server/simulate/simulate.h"
+#include "server/trainer/pipeline/first_batch.h"
 #include "server/trainer/pipeline/train.h"
 
 namespace trammel::api {
@@ -292,6 +293,13 @@ Evaluation Model::figures() const {
   return evaluation_of(parts.validation.value_or(parts.training));
 }
 
+std::vector<Note> Model::notes() const {
+  std::vector<Note> all;
+  for (const trammel::Note& note : notes_of(inside_->model))
+    all.push_back({note.code, to_text(note.severity), note.text});
+  return all;
+}
+
 Result<std::vector<Prediction>> Model::predict(std::span<const double> joints_deg, const Context& context) const {
   const CompensatedModel& model = inside_->model;
   const auto known = known_context(model, context);
@@ -346,7 +354,12 @@ Result<Model> train(const Cell& cell, std::span<const Batch> batches, const Trai
   if (const auto fits_too = check_share(options.validation_share); !fits_too) return passed_on(fits_too);
   const auto batch = checked(batches, *cell.inside().cell, drawn(options.validation_share, options.seed));
   if (!batch) return passed_on(batch);
+  if (!options.as_read) {
+    if (auto doubt = doubt_of_first_batch(cell.inside().cell, *batch, options.level))
+      return tl::make_unexpected(to_api(Failure(std::move(*doubt)).in("batch " + batch->id()).value()));
+  }
   trammel::TrainOptions how;
+  how.looked_at = options.as_read;
   how.level = options.level;
   how.bias = options.bias;
   how.seed = options.seed;

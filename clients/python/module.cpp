@@ -319,6 +319,12 @@ py::list parameters_of(const api::Model& model) {
   });
 }
 
+py::list notes_of(const api::Model& model) {
+  return texts(model.notes(), [](const api::Note& note) {
+    return py::dict("code"_a = note.code, "severity"_a = note.severity, "text"_a = note.text);
+  });
+}
+
 py::array_t<double> covariance_of(const api::Model& model) {
   const std::vector<double> flat = model.parameter_covariance();
   const auto size = static_cast<py::ssize_t>(model.parameters().size());
@@ -348,7 +354,8 @@ void add_model_file(py::class_<api::Model>& type) {
       .def("bias", &api::Model::bias)
       .def("parameters", &parameters_of)
       .def("parameter_covariance", &covariance_of)
-      .def("figures", [](const api::Model& model) { return to_python(model.figures()); });
+      .def("figures", [](const api::Model& model) { return to_python(model.figures()); })
+      .def("notes", &notes_of);
 }
 
 void add_model_work(py::class_<api::Model>& type) {
@@ -386,13 +393,14 @@ void add_work(py::module_& m) {
   m.def(
       "train",
       [](const api::Cell& cell, const std::vector<api::Batch>& batches, std::optional<std::string> level,
-         std::optional<std::string> bias, std::uint64_t seed, double validation_share, const py::object& progress) {
+         std::optional<std::string> bias, std::uint64_t seed, double validation_share, const py::object& progress,
+         bool as_read) {
         return told_of(progress, [&](api::Progress told) {
           return api::train(cell, batches,
-                            {std::move(level), std::move(bias), seed, validation_share, std::move(told)});
+                            {std::move(level), std::move(bias), seed, validation_share, std::move(told), as_read});
         });
       },
-      "cell"_a, "batches"_a, "level"_a, "bias"_a, "seed"_a, "validation_share"_a, "progress"_a);
+      "cell"_a, "batches"_a, "level"_a, "bias"_a, "seed"_a, "validation_share"_a, "progress"_a, "as_read"_a);
   m.def(
       "diagnose",
       [](const api::Cell& cell, const std::vector<api::Batch>& batches, std::uint64_t seed,

@@ -554,6 +554,99 @@ class Service(unittest.TestCase):
         self.assertIn(raised.exception.code, ("not_found", "refused"))
 
 
+class Guards(unittest.TestCase):
+    """A batch that nothing should be learned from gets the same words at each door: command line, Python, service."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = pathlib.Path(folder.name)
+        port = own_ports(cls)
+        domain = 1 + port // 8 % 48
+        cls.path = cls.folder / "cell-7.yaml"
+        cls.path.write_text(CELL.read_text().replace("../models", str(SOURCE / "models")).replace("bias: auto", "bias: none"))
+        config = cls.folder / "server.yaml"
+        config.write_text(f"version: 1\nserver: guards-{port}\ncells: [cell-7.yaml]\nstore: trammel.db\n")
+        cls.daemon = subprocess.Popen([BUILD / "server/trammeld", "--config", config, "--port", str(port), "--domain", str(domain)],
+                                      stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        cls.addClassCleanup(cls.end)
+        cls.session = trammel.Session(domain=domain, ports=[port], timeout_s=30)
+        cls.cell = trammel.Cell.load(cls.path)
+        good = trammel.simulate(cls.cell, TRUTH, trammel.plan(cls.cell, 60, seed=3), seed=3).csv()
+        cls.good = list(csv.DictReader(io.StringIO(good)))
+
+    @classmethod
+    def end(cls):
+        cls.daemon.terminate()
+        cls.daemon.wait()
+
+    def batch(self, name, mistake):
+        """The good batch with a mistake in each row; `mistake(i, row)` returns the columns that it changes."""
+        rows = [{**row, **{key: repr(float(value)) for key, value in mistake(i, row).items()}} for i, row in enumerate(self.good)]
+        text = io.StringIO()
+        writer = csv.DictWriter(text, rows[0], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+        path = self.folder / f"{name}.csv"
+        path.write_text(text.getvalue())
+        return path, trammel.Batch.parse(text.getvalue(), name)
+
+    def at_the_command_line(self, path):
+        done = subprocess.run([BUILD / "clients/trammel", "train", "--cell", self.path, "--batch", path, "-o",
+                               self.folder / "m.model", "--json", self.folder / "m.json"], capture_output=True, text=True)
+        return done.returncode, done.stderr
+
+    def words_of_the_service(self, batch):
+        """Why it learns nothing from the batch: it is refused when it is handed in, or kept in quarantine."""
+        try:
+            ended = self.session.wait_for(self.session.submit("cell-7", batch), limit_s=300)
+        except trammel.Refused as refused:
+            return refused.message
+        self.assertEqual(ended["verdict"], "quarantined", ended)
+        return ended["what"]
+
+    def test_a_batch_that_is_refused_is_refused_at_every_door_in_the_same_words(self):
+        later = len(self.good) // 2
+        following = lambda i: self.good[(i + 1) % len(self.good)]
+        mistakes = {
+            "mirrored": lambda i, row: {"y_mm": -float(row["y_mm"])},
+            "exchanged": lambda i, row: {"x_mm": row["z_mm"], "z_mm": row["x_mm"]},
+            "metres": lambda i, row: {axis: float(row[axis]) / 1000 for axis in ("x_mm", "y_mm", "z_mm")},
+            "inches": lambda i, row: {axis: float(row[axis]) / 25.4 for axis in ("x_mm", "y_mm", "z_mm")},
+            "shifted": lambda i, row: {axis: following(i)[axis] for axis in ("x_mm", "y_mm", "z_mm")},
+            "sign": lambda i, row: {"q3_deg": -float(row["q3_deg"])},
+            "joints": lambda i, row: {"q4_deg": row["q5_deg"], "q5_deg": row["q4_deg"]},
+            "zero-2": lambda i, row: {"q2_deg": float(row["q2_deg"]) + (0.2 if i >= later else 0)},
+            "zero-3": lambda i, row: {"q3_deg": float(row["q3_deg"]) + (0.2 if i >= later else 0)},
+        }
+        for name, mistake in mistakes.items():
+            with self.subTest(name):
+                path, batch = self.batch(name, mistake)
+                with self.assertRaises(trammel.Refused) as raised:
+                    trammel.train(self.cell, batch)
+                words = raised.exception.message
+                code, said = self.at_the_command_line(path)
+                self.assertNotEqual(code, 0)
+                self.assertIn(words, said)
+                self.assertIn(words, self.words_of_the_service(batch))
+
+    def test_a_model_that_leaves_hundreds_of_sigma_waits_for_a_person_at_every_door(self):
+        def three_in_ten(i, row):
+            return {"x_mm": float(row["x_mm"]) + 30 * np.sin(7 * i), "z_mm": float(row["z_mm"]) + 30 * np.cos(5 * i)} if i % 10 < 3 else {}
+        path, batch = self.batch("three-in-ten", three_in_ten)
+        code, said = self.at_the_command_line(path)
+        self.assertEqual(code, 0, said)
+        notes = json.loads((self.folder / "m.json").read_text())["notes"]
+        self.assertEqual((notes[0]["code"], notes[0]["severity"]), ("left_over_sigma", "stop"))
+        self.assertEqual(notes[-1]["code"], "robot_not_confirmed")
+        self.assertEqual(trammel.train(self.cell, batch).notes, notes)
+        ended = self.session.wait_for(self.session.submit("cell-7", batch), limit_s=300)
+        self.assertEqual((ended["verdict"], ended["in_force"]), ("undecided", False), ended)
+        made = trammel.Model.parse(self.session.export_model("cell-7", ended["version"]))
+        self.assertIn(made.notes[0]["text"], ended["what"])
+
+
 class Documents(unittest.TestCase):
     """What is written is true."""
 

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "tests/support/demand.h"
 #include "tests/support/learning_cell.h"
@@ -59,6 +60,23 @@ TEST(FirstBatch, OneInWhichSomethingJumpsHalfwayIsKeptOutWithItsPose) {
   EXPECT_NE(job.what.find("lost zero in joint 3"), std::string::npos) << job.what;
   EXPECT_NE(job.what.find("mm rms"), std::string::npos) << job.what;
   EXPECT_EQ(cell.in_force(), 0) << "nothing is learned";
+}
+
+TEST(FirstBatch, AModelThatLeavesHundredsOfSigmaWaitsForAPerson) {
+  auto without_bias = std::make_shared<Cell>(*test::cell_7());
+  without_bias->model.bias = "none";
+  LearningCell cell(without_bias);
+  MeasurementBatch bad = measured(8);
+  for (std::size_t i = 0; i < bad.measurements.size(); ++i) {
+    if (i % 10 < 3)
+      bad.measurements[i].p_W +=
+          0.03 * Vector3(std::sin(7.0 * static_cast<double>(i)), std::cos(5.0 * static_cast<double>(i)),
+                         std::sin(3.0 * static_cast<double>(i)));
+  }
+  const JobProgress job = cell.submit(std::move(bad));
+  EXPECT_EQ(cell.in_force(), 0) << job.what;
+  EXPECT_EQ(job.outcome.verdict, JobVerdict::kUndecided) << job.what;
+  EXPECT_NE(job.outcome.why.find("times the stated sigma is left"), std::string::npos) << job.outcome.why;
 }
 
 TEST(FirstBatch, ALaterOneThatWasReadWronglyIsNamedLikewise) {

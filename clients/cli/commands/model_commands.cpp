@@ -26,6 +26,7 @@
 #include "server/report/note_json.h"
 #include "server/report/pages_beside.h"
 #include "server/robot/cell_rules.h"
+#include "server/trainer/pipeline/first_batch.h"
 #include "server/trainer/pipeline/refitted.h"
 #include "server/trainer/pipeline/train.h"
 
@@ -126,8 +127,7 @@ std::optional<Jump> jump_beside(const CompensatedModel& model, const CheckedBatc
 std::string jump_text(const std::optional<Jump>& jump) {
   if (!jump) return "";
   return fmt::format(
-      "note: something changed in the middle of the batch: {}; the model is of no arm that is there: give the poses "
-      "before and after as two batches, or see what diagnose says\n",
+      "note: something changed in the middle of the batch, {}; no single arm fits the poses before and after\n",
       in_words(*jump));
 }
 
@@ -135,6 +135,16 @@ nlohmann::ordered_json jump_json(const Jump& jump) {
   return {{"source", jump.source},   {"pose_id", jump.pose_id},
           {"row", jump.row},         {"effect_rms_mm", to_mm(jump.effect)},
           {"p_value", jump.p_value}, {"could_also_be", jump.could_also_be}};
+}
+
+/// Refuses what nothing should be learned from, unless there is a model to start from, which has judged the batch, or
+/// somebody has looked at it.
+Status check_first_batch(const TrainArguments& arguments, const std::shared_ptr<const Cell>& cell,
+                         const CheckedBatch& batch) {
+  if (arguments.as_read || !arguments.from.empty()) return {};
+  auto doubt = doubt_of_first_batch(cell, batch, arguments.level);
+  if (!doubt) return {};
+  return Failure(std::move(*doubt)).in("batch " + batch.id());
 }
 
 Status train_model(const TrainArguments& arguments) {
@@ -169,19 +179,21 @@ Status train_model(const TrainArguments& arguments) {
     options.refit = std::move(*refit);
     if (const Status fits = hold_against(*options.from, options.refit, *cell, *batch); !fits) return fits;
   }
+  const auto shared = std::make_shared<const Cell>(std::move(*cell));
+  if (const Status first = check_first_batch(arguments, shared, *batch); !first) return first;
   const Result<CompensatedModel> model = [&] {
     ProgressLine progress;
     options.progress = [&](const std::string& stage, double share) {
       progress.show(stage, share);
       return true;
     };
-    return train(std::make_shared<const Cell>(std::move(*cell)), *batch, options);
+    return train(shared, *batch, options);
   }();
   if (!model) return tl::make_unexpected(model.error());
   if (const Status written = write_output(arguments.output, serialize(*model)); !written) return written;
   const auto& parts = model->parts();
   const std::vector<Unlike> unlike = options.fleet ? unlike_twins(parts, *options.fleet) : std::vector<Unlike>();
-  const std::optional<Jump> jump = options.from ? std::nullopt : jump_beside(*model, *batch);
+  const std::optional<Jump> jump = arguments.as_read && !options.from ? jump_beside(*model, *batch) : std::nullopt;
   tell(model_text(*model) + unlike_text(unlike) + jump_text(jump) +
            (parts.validation ? fmt::format("on {} poses held out:\n", rows_of(*parts.validation)) +
                                    evaluation_table(*parts.validation)
@@ -329,8 +341,10 @@ void add_train(CLI::App& app, Action& chosen) {
                    "Share of the rows to hold out, 0 to 0.9, where the batch has no set column; 0: none are held out")
       ->check(CLI::Range(0.0, 0.9))
       ->capture_default_str();
-  command->add_flag("--as-read", arguments->as_read,
-                    "Learn from the positions as they are read, though another reading of the batch fits better");
+  command->add_flag(
+      "--as-read", arguments->as_read,
+      "Learn from the batch as it is, though another reading of it fits better or something changed in the "
+      "middle of it");
   command->add_option("-o,--output", arguments->output, "Model file to write")->required();
   add_json_option(*command, arguments->json);
   command->callback([arguments, &chosen] { chosen = [arguments] { return train_model(*arguments); }; });

@@ -139,6 +139,8 @@ class TRAMMEL_API Model {
   [[nodiscard]] std::vector<double> parameter_covariance() const;
   /// Errors on poses held out from training, else on the training poses.
   [[nodiscard]] Evaluation figures() const;
+  /// What a user of the model should know, the gravest first.
+  [[nodiscard]] std::vector<Note> notes() const;
 
   /// The error to expect at N joint vectors, given one after the other (N x n values, deg; of a rail mm). Refuses
   /// joints beyond the robot's limits, numbers that are not finite, and a tool with a payload that no training pose
@@ -169,8 +171,10 @@ struct TrainOptions {
   std::uint64_t seed = 1;            ///< of the search for hyperparameters and of the rows held out
   double validation_share = 0;       ///< of the rows, held out where the batch has no column `set`
   Progress progress;                 ///< may be empty
+  bool as_read = false;              ///< somebody has looked at the batches: learn from them as they are
 };
 /// A model of the cell, from batches of measurements. Several batches are sessions of one arm.
+/// Refuses what the service keeps out: a batch that was read wrongly, or in the middle of which something changed.
 [[nodiscard]] TRAMMEL_API Result<Model> train(const Cell& cell, std::span<const Batch> batches,
                                               const TrainOptions& options = {});
 

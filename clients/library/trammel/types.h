@@ -72,6 +72,13 @@ struct ModelFacts {
   bool in_force = false;   ///< of a service: whether its cell is served with it
 };
 
+/// What a user of a model should know, in the words of the command line and of the service.
+struct Note {
+  std::string code;      ///< for programs: `robot_not_confirmed`
+  std::string severity;  ///< `info`; `warning`: figures mean less than they seem to; `stop`: a person must look first
+  std::string text;      ///< for people
+};
+
 /// Told what is being done and which share of it is done, [0, 1]. Returns false to give up (kBusy).
 using Progress = std::function<bool(const std::string& stage, double share)>;
 

@@ -348,6 +348,11 @@ class Model:
         """Errors on poses held out from training, else on the training poses, as `evaluate()` returns them."""
         return self._inside.figures()
 
+    @property
+    def notes(self) -> List[Dict[str, Any]]:
+        """What a user of the model should know, the gravest first: `code`, `severity` (`info`, `warning`, `stop`), `text`."""
+        return self._inside.notes()
+
     def predict(self, joints_deg: Table, tool: str = "", payload: str = "", directions: Sequence[int] = (),
                 temperature_c: Optional[float] = None) -> Predictions:
         """The error to expect at `joints_deg` (N, n) or (n,), deg, of rails mm; or a pandas frame with `q1_deg ...`.
@@ -381,11 +386,12 @@ class Model:
 
 
 def train(cell: Cell, batches: Batches, level: Optional[str] = None, bias: Optional[str] = None, seed: int = 1,
-          validation_share: float = 0.0, progress: Optional[Progress] = None) -> Model:
+          validation_share: float = 0.0, progress: Optional[Progress] = None, as_read: bool = False) -> Model:
     """A model of `cell`. `level` (`M0` to `M3`, `M2,gear_transmission:3`) and `bias` (`none`, `auto`, a kernel) instead
-    of what the cell file says; `validation_share` of the rows are held out where the batch has no column `set`."""
+    of what the cell file says; `validation_share` of the rows are held out where the batch has no column `set`. A
+    batch that was read wrongly or in the middle of which something changed is refused, unless `as_read`."""
     return Model(_trammel.train(_inside_cell(cell), _inside_of(batches), level, bias, whole(seed, "seed"), validation_share,
-                                progress))
+                                progress, as_read))
 
 
 def diagnose(cell: Cell, batches: Batches, seed: int = 1, progress: Optional[Progress] = None) -> Dict[str, Any]:

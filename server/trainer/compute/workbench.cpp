@@ -4,8 +4,6 @@
 #include <utility>
 
 #include "server/base/units.h"
-#include "server/calibrate/batch_check.h"
-#include "server/calibrate/jump.h"
 #include "server/compensate/known_rows.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
@@ -20,6 +18,7 @@
 #include "server/trainer/acceptance/fits_cell.h"
 #include "server/trainer/acceptance/verdict.h"
 #include "server/trainer/pipeline/extend.h"
+#include "server/trainer/pipeline/first_batch.h"
 #include "server/trainer/pipeline/lasting_sources.h"
 #include "server/trainer/pipeline/successor.h"
 
@@ -75,19 +74,6 @@ bool is_better_on(const std::vector<JudgingSession>& sessions, const Compensated
       .beyond_chance();
 }
 
-/// Why nothing is to be learned from the first batch of a cell: it was not read as it was meant, or something began in
-/// the middle of it. Empty: it may be.
-std::string why_no_first_batch(const CheckedBatch& batch, const std::shared_ptr<const Cell>& cell) {
-  if (const auto doubt = batch_doubt(batch.rows(), *cell)) return sentence(*doubt);
-  const auto jump = jump_within(cell, batch.in_order_of_time().rows());
-  if (!jump) return "";
-  return fmt::format(
-      "something changed in the middle of it: {}; a model of all its poses would be of no arm that is there: submit "
-      "the "
-      "poses before and after as two batches",
-      in_words(*jump));
-}
-
 /// `; ` before each that says something.
 std::string joined_by_semicolons(const std::vector<std::string>& parts) {
   std::string text;
@@ -133,8 +119,7 @@ Result<Made> Workbench::trained(const ComputeWatch& watch) {
     const auto batch = batches_.first();
     if (!batch) return tl::make_unexpected(batch.error());
     if (!*in_force) {
-      if (const std::string why = why_no_first_batch(*batch, task_.cell); !why.empty())
-        return Made{std::nullopt, "", why};
+      if (const auto doubt = doubt_of_first_batch(task_.cell, *batch)) return Made{std::nullopt, "", sentence(*doubt)};
     }
     if (*in_force) {
       const Triage triaged = triage((*in_force)->model, *batch);
