@@ -93,11 +93,7 @@ class ReceivedMessageType final : public SafeType<PubSubType> {
 
  private:
   [[nodiscard]] std::optional<Fault> fault_of(std::span<const unsigned char> bytes) const {
-    if (bytes.size() <= this->max_sample_) return find_fault<Message>(bytes);
-    Fault fault{RESULT_TOO_LARGE, "the request is too large", {}, {}, {}, {}};
-    fault.value = static_cast<double>(bytes.size());
-    fault.limit = static_cast<double>(this->max_sample_);
-    return fault;
+    return this->is_too_large(bytes) ? this->too_large(bytes) : find_fault<Message>(bytes);
   }
 
   const std::shared_ptr<std::atomic<std::uint64_t>> unreadable_;

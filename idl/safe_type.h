@@ -15,6 +15,7 @@
 #include <string_view>
 #include <utility>
 
+#include "idl/guard/cut_sample.h"
 #include "idl/limits.h"
 #include "idl/valid.h"
 #include "server/base/mutex.h"
@@ -47,7 +48,7 @@ class SafeType : public PubSubType {
   }
 
   bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
-    if (payload->length > max_sample_ || find_fault<Sample>(bytes_of(*payload))) return false;
+    if (is_too_large(bytes_of(*payload)) || find_fault<Sample>(bytes_of(*payload))) return false;
     return deserialize_unseen(payload, data);
   }
 
@@ -61,6 +62,16 @@ class SafeType : public PubSubType {
   }
 
  protected:
+  [[nodiscard]] bool is_too_large(std::span<const unsigned char> sample) const {
+    return whole_size(sample) > max_sample_;
+  }
+  [[nodiscard]] Fault too_large(std::span<const unsigned char> sample) const {
+    Fault fault{RESULT_TOO_LARGE, "the request is too large", {}, {}, {}, {}};
+    fault.value = static_cast<double>(whole_size(sample));
+    fault.limit = static_cast<double>(max_sample_);
+    return fault;
+  }
+
   bool deserialize_unseen(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) {
     try {
       return PubSubType::deserialize(payload, data);
@@ -150,11 +161,8 @@ class ReceivedType final : public SafeType<PubSubType> {
   [[nodiscard]] std::optional<Fault> fault_of(const eprosima::fastrtps::rtps::SerializedPayload_t& payload,
                                               const RequestHeader& header) const {
     if (header.contract_version() != CONTRACT_VERSION) return fault_of_contract(header.contract_version());
-    if (payload.length <= this->max_sample_) return find_fault<Request>(bytes_of(payload));
-    Fault fault{RESULT_TOO_LARGE, "the request is too large", {}, {}, {}, {}};
-    fault.value = payload.length;
-    fault.limit = this->max_sample_;
-    return fault;
+    return this->is_too_large(bytes_of(payload)) ? this->too_large(bytes_of(payload))
+                                                 : find_fault<Request>(bytes_of(payload));
   }
 
   const std::shared_ptr<std::atomic<std::uint64_t>> unreadable_;

@@ -5,6 +5,7 @@
 #include <bit>
 
 #include "idl/guard/announcement_check.h"
+#include "idl/guard/cut_sample.h"
 
 namespace trammel::wire {
 namespace {
@@ -198,7 +199,8 @@ std::optional<Dropped> MessageCheck::check_fragments(const Submessage& submessag
   const auto fragments = fragments_of(submessage);
   if (!fragments) return Dropped::kLength;
   if (!is_number(fragments->sequence_number)) return Dropped::kNumber;
-  if (fragments->sample_size > received_.largest_sample) return Dropped::kSampleSize;
+  const bool too_large = fragments->sample_size > received_.largest_sample;
+  if (too_large && fragments->first != 1) return Dropped::kSampleSize;
   if ((fragments->writer & kBuiltIn) == kBuiltIn) return Dropped::kFragment;
   if (fragments->size < kSmallestFragment || fragments->first < 1 || fragments->count < 1) return Dropped::kFragment;
   const std::uint64_t last = std::uint64_t{fragments->first} + fragments->count - 1;
@@ -216,8 +218,22 @@ std::optional<Dropped> MessageCheck::check_fragments(const Submessage& submessag
   const std::uint64_t begin = std::uint64_t{fragments->first - 1} * fragments->size;
   const std::uint64_t end = std::min<std::uint64_t>(last * fragments->size, fragments->sample_size);
   if (after.rest().size() < end - begin) return Dropped::kFragment;
+  if (too_large) return cut_too_large(submessage, after.rest(), fragments->sample_size);
   const MutexLock lock(memory_.mutex);
   return memory_.unfinished.add(source_, *fragments, received_.now);
+}
+
+/// The writer is reliable: what never arrives is asked for again for ever, and all behind it waits. So the first
+/// fragment becomes a whole sample, in place, and its reader tells the writer why it is refused.
+std::optional<Dropped> MessageCheck::cut_too_large(const Submessage& submessage, Bytes payload,
+                                                   std::uint32_t sample_size) {
+  constexpr unsigned char kKeyOfFragment = 0x04;
+  if ((submessage.flags & kKeyOfFragment) != 0) return Dropped::kSampleSize;
+  const auto flags = static_cast<unsigned char>((submessage.flags & (kLittleEndian | kInlineQos)) | kPayload);
+  edited_.put(message_.subspan(static_cast<std::size_t>(submessage.body.data() - message_.data()) - 4, 2),
+              std::array<unsigned char, 2>{kData, flags});
+  edited_.put(payload.subspan(kOptionsAt, 2), options_of_cut(sample_size));
+  return {};
 }
 
 std::optional<Dropped> MessageCheck::check_heartbeat(const Submessage& submessage) {

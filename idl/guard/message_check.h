@@ -36,6 +36,7 @@ class MessageCheck {
   void make_gap(const Submessage& data, std::int64_t number);
   Fault check_announced(std::uint32_t writer, Bytes payload);
   Fault check_fragments(const Submessage& submessage);
+  Fault cut_too_large(const Submessage& submessage, Bytes payload, std::uint32_t sample_size);
   Fault check_heartbeat(const Submessage& submessage);
   Fault check_heartbeat_frag(const Submessage& submessage);
   Fault check_gap(const Submessage& submessage);

@@ -310,6 +310,9 @@ std::size_t BadRequests::submissions() {
   expect("a batch of the largest size", wire::RESULT_TOO_LARGE, [](Request& r) { r.csv(std::string(30u << 20, 'x')); });
   expect("a batch over the largest size", wire::RESULT_TOO_LARGE,
          [](Request& r) { r.csv(std::string(wire::kMaxText + 1, 'x')); });
+  expect("a batch that no topic has room for", wire::RESULT_TOO_LARGE,
+         [](Request& r) { r.csv(std::string(40u << 20, 'x')); });
+  expect("a column that is missing, behind it", wire::RESULT_REFUSED, [](Request& r) { r.csv("q1_deg,x_mm\n1,2\n"); });
   return send.check();
 }
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "idl/guard/announcement_check.h"
+#include "idl/guard/cut_sample.h"
 #include "idl/limits.h"
 #include "tests/support/rtps_packet.h"
 
@@ -286,11 +287,45 @@ TEST(Guard, FragmentsThatTheirSampleDoesNotHaveAreDropped) {
   EXPECT_EQ(fate(fragments(1, 1, 1, 4096, 4)), Dropped::kFragment) << "the library keeps a list in each";
   EXPECT_EQ(fate(fragments(1, 2, 1024, 4096, 1024)), Dropped::kFragment) << "two said, one there";
   EXPECT_EQ(fate(fragments(1, 1, 1024, 4096, 1024, kPublications)), Dropped::kFragment) << "would hide a list";
-  EXPECT_EQ(fate(fragments(1, 1, 60000, kMaxTextSample + 1, 60000)), Dropped::kSampleSize);
+  EXPECT_EQ(fate(fragments(2, 1, 60000, kMaxTextSample + 1, 60000)), Dropped::kSampleSize);
 
   Guard guard(kMaxTextSample);
   EXPECT_EQ(fate(guard, fragments(1, 1, 1024, 4096, 1024)), kPasses);
   EXPECT_EQ(fate(guard, fragments(2, 1, 2048, 4096, 2048)), Dropped::kFragment) << "another size than before";
+}
+
+TEST(Guard, OfASampleThatIsTooLargeTheBeginningPassesAsASampleThatSaysSo) {
+  Guard guard(kMaxTextSample);
+  PacketBytes beginning(60000, 'x');
+  std::copy(kSample.begin(), kSample.end(), beginning.begin());
+  const PacketBytes first = from().fragments({0, kUserWriter, 7, 1, 1, 60000, 40u << 20, beginning}).bytes();
+  const auto passed = guard.check(first, kSocket);
+  ASSERT_TRUE(passed);
+  Bytes rest = passed->subspan(kHeader);
+  const auto data = next_submessage(rest);
+  ASSERT_TRUE(data);
+  EXPECT_EQ(data->id, kData);
+  EXPECT_EQ(data->flags, kLittleEndian | kPayload);
+  const Bytes sample = data->body.last(beginning.size());
+  EXPECT_EQ(whole_size(sample), 40u << 20);
+  EXPECT_TRUE(std::equal(kSample.begin() + 4, kSample.end(), sample.begin() + 4));
+  const PacketBytes again(passed->begin(), passed->end());
+  EXPECT_EQ(fate(guard, again), kPasses) << "a guard behind this one finds nothing wrong";
+}
+
+TEST(Guard, TheSizeOfACutSampleIsNeverBelowWhatItHas) {
+  PacketBytes sample(5000);
+  EXPECT_EQ(whole_size(sample), sample.size());
+  for (const std::uint32_t bytes : {(32u << 20) + 1, 40u << 20, 0xffffffffu}) {
+    const auto options = options_of_cut(bytes);
+    std::copy(options.begin(), options.end(), sample.begin() + kOptionsAt);
+    EXPECT_GE(whole_size(sample), bytes);
+    EXPECT_LT(whole_size(sample) - bytes, kMebibyte);
+  }
+  sample[kOptionsAt] = kIsCut;
+  sample[kOptionsAt + 1] = 0;
+  EXPECT_EQ(whole_size(sample), sample.size());
+  EXPECT_EQ(whole_size(Bytes(sample).first(3)), 3u);
 }
 
 TEST(Guard, SamplesBegunAndNotFinishedAreBounded) {
