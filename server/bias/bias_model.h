@@ -57,12 +57,12 @@ class BiasModel {
   [[nodiscard]] std::vector<BiasPrediction> predict_all(const Eigen::MatrixXd& q,
                                                         const std::vector<BiasFeatures>& features = {}) const;
 
-  /// N, in [0, 1]: `prior_share` of every training pose when it is left out. A target whose share is above the 99 %
+  /// N, in [0, 1]: `prior_share` of every training row without its joint vector. A target whose share is above the 99 %
   /// quantile of these is farther from the data than the data are from each other.
   [[nodiscard]] Eigen::VectorXd leave_one_out_prior_share() const;
-  /// N x 3, m: every training pose predicted from all the others.
+  /// N x 3, m: every training row predicted from those at all other joint vectors.
   [[nodiscard]] Eigen::MatrixXd leave_one_out_mean_B() const;
-  /// N x 3, m: standard deviation of the measurement of every training pose, given all the others. With more than 5000
+  /// N x 3, m: standard deviation of the measurement of every training row, given the same. With more than 5000
   /// poses: given the others of its expert (local_experts.h).
   [[nodiscard]] Eigen::MatrixXd leave_one_out_stddev_B() const;
   /// Errors of these observations when they are predicted from all others, with the hyperparameters as found;

@@ -10,6 +10,7 @@
 #include "server/base/units.h"
 #include "server/bias/flange/flange_views.h"
 #include "server/bias/kernels/kernel_spelling.h"
+#include "server/bias/pose_groups.h"
 #include "server/bias/process/halves.h"
 
 namespace trammel {
@@ -25,7 +26,7 @@ constexpr std::array kAtFlange = {"se + flange", "matern52 + flange"};
 constexpr std::array kDear = {"matern52 + joint_map + parameters", "se + joint_map"};
 constexpr Index kBlocks = 8;                  // eight give a standard error, and seven eighths still show the physics
 constexpr std::size_t kFewestBlocks = 4;      // half of them: of fewer the standard error means little
-constexpr Index kFewestToJudge = 30;          // observations: blocks of fewer than four tell nothing
+constexpr Index kFewestToJudge = 30;          // joint vectors: blocks of fewer than four tell nothing
 constexpr double kStandardErrors = 2;         // chance alone exceeds them in 1 of 40 cases
 constexpr double kHyperparametersOfNone = 3;  // the standard deviation of each coordinate
 constexpr double kFitShare = 0.5;             // of the time for one candidate: the rest goes into leaving out blocks
@@ -47,18 +48,41 @@ VectorXd negative_log_density(const MatrixXd& error, const MatrixXd& stddev) {
   return (0.5 * z.square() + stddev.array().log() + constant).rowwise().sum();
 }
 
+/// The rows (rising) of some poses.
+std::vector<Index> rows_of(const std::vector<PoseGroup>& poses, const std::vector<Index>& some) {
+  std::vector<Index> rows;
+  for (const Index p : some) {
+    const PoseGroup& pose = poses[static_cast<std::size_t>(p)];
+    rows.insert(rows.end(), pose.begin(), pose.end());
+  }
+  std::sort(rows.begin(), rows.end());
+  return rows;
+}
+
+/// The sum of `of_row` over the rows of each pose.
+VectorXd by_pose(const std::vector<PoseGroup>& poses, const VectorXd& of_row) {
+  VectorXd sum(std::ssize(poses));
+  for (std::size_t p = 0; p < poses.size(); ++p) sum[static_cast<Index>(p)] = of_row(poses[p]).sum();
+  return sum;
+}
+
 /// One block left out: the rest, and all residuals with the physics identified from the rest.
 struct Fold {
   std::vector<Index> block, rest;
   MatrixXd residual_B;  // N x 3
 };
 
-/// The blocks: observations that are neighbours in `table` (N x n). Those that the physics cannot be identified without
-/// are left out.
-std::vector<Fold> folds(const BiasProblem& problem, const MatrixXd& table, const ResidualWithout& residual_without) {
+/// The blocks of whole poses, whose first rows are neighbours in `table` (N x n). Blocks that the physics cannot be
+/// identified without are left out.
+std::vector<Fold> folds(const BiasProblem& problem, const std::vector<PoseGroup>& poses, const MatrixXd& table,
+                        const ResidualWithout& residual_without) {
   const std::vector<Index> observations = in_order(problem.q.rows());
+  std::vector<Index> first;
+  for (const PoseGroup& pose : poses) first.push_back(pose.front());
   std::vector<Fold> all;
-  for (const std::vector<Index>& block : halved(table, (table.rows() + kBlocks - 1) / kBlocks)) {
+  for (const std::vector<Index>& neighbours :
+       halved(table(first, Eigen::all), (std::ssize(poses) + kBlocks - 1) / kBlocks)) {
+    const std::vector<Index> block = rows_of(poses, neighbours);
     std::optional<MatrixXd> residual_B = residual_without ? residual_without(block) : problem.residual_B;
     if (!residual_B) continue;
     Fold fold{block, {}, *std::move(residual_B)};
@@ -160,8 +184,8 @@ double hyperparameters_of(const BiasModel& model) {
   return static_cast<double>(state.hyperparameters.size() + state.block_hyperparameters.size());
 }
 
-/// Whether `nlpd` (of each observation) is clearly below `other`. The hyperparameters were found with the observation
-/// that is left out, so each of them raises the sum by one nat (Akaike 1974).
+/// Whether `nlpd` (of each pose, the sum of its rows) is clearly below `other`. The hyperparameters were found with the
+/// pose that is left out, so each of them raises the sum by one nat (Akaike 1974).
 bool clearly_likelier(const VectorXd& nlpd, const VectorXd& other, double more_hyperparameters) {
   const Mean likelier = mean_of(other - nlpd);
   return likelier.value - more_hyperparameters / static_cast<double>(nlpd.size()) > kStandardErrors * likelier.stddev;
@@ -170,7 +194,7 @@ bool clearly_likelier(const VectorXd& nlpd, const VectorXd& other, double more_h
 /// The best candidate so far.
 struct Best {
   std::size_t candidate = 0;
-  VectorXd nlpd;  // of each observation
+  VectorXd nlpd;  // of each pose
   double hyperparameters = kHyperparametersOfNone;
   std::optional<BiasModel> model;
 };
@@ -180,19 +204,20 @@ class Choosing {
   Choosing(const BiasProblem& problem, const BiasOptions& options, const ResidualWithout& residual_without,
            Index most_coupled)
       : problem_(problem),
+        poses_(pose_groups(problem.q)),
         options_(options),
         most_coupled_(most_coupled),
         several_levers_(!problem.features.empty() && has_several_levers(problem.features)) {
-    if (problem.q.rows() < kFewestToJudge) return;
+    if (std::ssize(poses_) < kFewestToJudge) return;
     const Index count = problem.q.rows();
-    in_time_ = folds(problem, VectorXd::LinSpaced(count, 0, static_cast<double>(count - 1)), residual_without);
-    in_joint_space_ = folds(problem, problem.q, residual_without);
+    in_time_ = folds(problem, poses_, VectorXd::LinSpaced(count, 0, static_cast<double>(count - 1)), residual_without);
+    in_joint_space_ = folds(problem, poses_, problem.q, residual_without);
   }
 
   Result<ChosenBias> run() {
-    if (problem_.q.rows() < kFewestToJudge) {
-      choice_.sentence = fmt::format("no bias: {} observations are too few to judge one, at least {}",
-                                     problem_.q.rows(), kFewestToJudge);
+    if (std::ssize(poses_) < kFewestToJudge) {
+      choice_.sentence =
+          fmt::format("no bias: {} poses are too few to judge one, at least {}", poses_.size(), kFewestToJudge);
       choice_.kernel = "none";
       return ChosenBias{choice_, std::nullopt};
     }
@@ -223,11 +248,12 @@ class Choosing {
  private:
   void ask_none() {
     const MatrixXd& error = problem_.residual_B;
-    best_.nlpd = negative_log_density_of_none(error);
+    const VectorXd nlpd = negative_log_density_of_none(error);
+    best_.nlpd = by_pose(poses_, nlpd);
     without_in_time_ = missed_by_none(in_time_);
     without_in_joint_space_ = missed_by_none(in_joint_space_);
     choice_.candidates.push_back(
-        {"none", rms(error), best_.nlpd.mean() / 3, rms(without_in_time_), rms(without_in_joint_space_), 0, 0, ""});
+        {"none", rms(error), nlpd.mean() / 3, rms(without_in_time_), rms(without_in_joint_space_), 0, 0, ""});
   }
 
   Status ask(const std::string& kernel) {
@@ -261,7 +287,8 @@ class Choosing {
     BiasCandidate& candidate = choice_.candidates.back();
 
     const double hyperparameters = hyperparameters_of(*model);
-    if (!clearly_likelier(nlpd, best_.nlpd, hyperparameters - best_.hyperparameters)) {
+    const VectorXd of_poses = by_pose(poses_, nlpd);
+    if (!clearly_likelier(of_poses, best_.nlpd, hyperparameters - best_.hyperparameters)) {
       candidate.verdict = fmt::format("not clearly better than {}", choice_.candidates[best_.candidate].kernel);
       not_likelier_.insert(choice_.candidates.size() - 1);
     } else if (gain.value <= kStandardErrors * gain.stddev) {
@@ -269,7 +296,7 @@ class Choosing {
     } else if (far.value < -kStandardErrors * far.stddev) {
       candidate.verdict = "harms where neighbours in joint space are left out";
     } else {
-      best_ = {choice_.candidates.size() - 1, nlpd, hyperparameters, std::move(*model)};
+      best_ = {choice_.candidates.size() - 1, of_poses, hyperparameters, std::move(*model)};
     }
     return {};
   }
@@ -330,6 +357,7 @@ class Choosing {
   }
 
   const BiasProblem& problem_;
+  const std::vector<PoseGroup> poses_;
   const BiasOptions& options_;
   const Index most_coupled_;
   const bool several_levers_;
@@ -344,8 +372,9 @@ class Choosing {
 }  // namespace
 
 bool is_worth_it(const BiasProblem& problem, const BiasModel& model) {
-  return clearly_likelier(negative_log_density_left_out(problem, model),
-                          negative_log_density_of_none(problem.residual_B),
+  const std::vector<PoseGroup> poses = pose_groups(problem.q);
+  return clearly_likelier(by_pose(poses, negative_log_density_left_out(problem, model)),
+                          by_pose(poses, negative_log_density_of_none(problem.residual_B)),
                           hyperparameters_of(model) - kHyperparametersOfNone);
 }
 

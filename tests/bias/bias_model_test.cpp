@@ -122,6 +122,49 @@ TEST(BiasModel, LeaveOneOutEqualsRefittingWithoutThePoint) {
   }
 }
 
+/// `poses` joint vectors of `smooth`, each measured by three reflectors that share an error of the arm of 5 sigma.
+BiasProblem three_reflectors(Index poses, std::uint64_t seed, double smooth) {
+  BiasProblem problem = smooth_problem(3 * poses, seed, 30e-6);
+  std::mt19937_64 random(seed + 500);
+  for (Index i = 0; i < 3 * poses; ++i) {
+    const Index first = i - i % 3;
+    problem.q.row(i) = problem.q.row(first);
+    for (Index d = 0; d < 3; ++d) {
+      const double shared = i == first ? 5 * problem.sigma[0] * normal(&random) : 0.0;
+      problem.residual_B(i, d) = i == first ? shared : problem.residual_B(first, d);
+    }
+  }
+  for (Index i = 0; i < 3 * poses; ++i) {
+    problem.residual_B.row(i) += smooth * smooth_error_B(problem.q.row(i)).transpose();
+    for (Index d = 0; d < 3; ++d) problem.residual_B(i, d) += problem.sigma[0] * normal(&random);
+  }
+  return problem;
+}
+
+TEST(BiasModel, LeavesAllReflectorsOfAPoseOutTogether) {
+  const BiasProblem problem = three_reflectors(20, 8, 1.0);
+  const BiasModel model = fit(problem);
+  const Eigen::MatrixXd left_out = model.leave_one_out_mean_B();
+  const Eigen::MatrixXd stddev = model.leave_one_out_stddev_B();
+  const Eigen::VectorXd share = model.leave_one_out_prior_share();
+  for (Index i = 0; i < problem.q.rows(); i += 9) {
+    BiasState state = model.state();
+    BiasProblem rest = problem;
+    for (Index k = 0; k < 3; ++k) rest = without(rest, i);
+    state.q = rest.q;
+    state.residual_B = rest.residual_B;
+    state.sigma = rest.sigma;
+    const auto other = BiasModel::restore(state);
+    ASSERT_TRUE(other.has_value());
+    const BiasPrediction prediction = other->predict(problem.q.row(i));
+    for (Index k = i; k < i + 3; ++k) {
+      EXPECT_LT((left_out.row(k).transpose() - prediction.mean_B).norm(), 1e-9);
+      EXPECT_LT((stddev.row(k).transpose() - prediction.measured_stddev_B).norm(), 1e-9);
+      EXPECT_NEAR(share[k], prediction.prior_share, 1e-6);
+    }
+  }
+}
+
 TEST(BiasModel, GrowsAndShrinksAsIfConditionedAnew) {
   const BiasProblem all = smooth_problem(230, 30);
   const BiasModel model = fit({all.q.topRows(200), all.residual_B.topRows(200), all.sigma.head(200)});

@@ -77,6 +77,28 @@ TEST(ChooseBias, WhatNeighboursInTimeShareIsNoReasonForABias) {
   EXPECT_NE(chosen.choice.sentence.find("neighbours in time"), std::string::npos) << chosen.choice.sentence;
 }
 
+TEST(ChooseBias, WhatOnlyTheReflectorsOfAPoseShareIsNoReasonForABias) {
+  BiasProblem problem = noise_alone(180, 6);
+  for (Index i = 0; i < 180; ++i) {
+    if (i % 3 == 0) continue;
+    problem.q.row(i) = problem.q.row(i - i % 3);
+    problem.residual_B.row(i) = 5 * problem.residual_B.row(i - i % 3) + 0.5 * problem.residual_B.row(i);
+  }
+  for (Index i = 0; i < 180; i += 3) problem.residual_B.row(i) *= 5;
+  const ChosenBias chosen = choose_bias(problem, {}).value();
+  EXPECT_EQ(chosen.choice.kernel, "none") << chosen.choice.sentence;
+  const BiasCandidate& none = chosen.choice.candidates[0];
+  // The other reflectors of a pose would tell nine tenths of it.
+  EXPECT_GT(chosen.choice.candidates[1].leave_one_out_rms, 0.5 * none.leave_one_out_rms);
+}
+
+TEST(ChooseBias, CountsPosesAndNotTheirReflectors) {
+  BiasProblem problem = smooth_problem(60, 1);
+  for (Index i = 0; i < 60; ++i) problem.q.row(i) = problem.q.row(i - i % 3);
+  const ChosenBias chosen = choose_bias(problem, {}).value();
+  EXPECT_NE(chosen.choice.sentence.find("20 poses are too few"), std::string::npos) << chosen.choice.sentence;
+}
+
 TEST(ChooseBias, ThePhysicsThatKnewABlockIsNotAskedAboutIt) {
   const BiasProblem problem = smooth_problem(80, 5);
   std::vector<std::size_t> asked;
@@ -164,7 +186,7 @@ TEST(ChooseBias, KernelsWithBlocksAreSkippedWhereThereAreMoreObservationsThanThe
 TEST(ChooseBias, TooFewObservationsAreNotJudged) {
   const ChosenBias chosen = choose_bias(smooth_problem(29, 1), {}).value();
   EXPECT_EQ(chosen.choice.kernel, "none");
-  EXPECT_NE(chosen.choice.sentence.find("29 observations are too few"), std::string::npos);
+  EXPECT_NE(chosen.choice.sentence.find("29 poses are too few"), std::string::npos);
   EXPECT_FALSE(choose_bias(smooth_problem(5, 1), {}));
 }
 

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/base/check.h"
+#include "server/bias/pose_groups.h"
 #include "server/bias/process/inducing_points.h"
 #include "server/numerics/numerics.h"
 #include "server/numerics/seeded_random.h"
@@ -217,10 +218,11 @@ void CoupledPosterior::leave_out(const CoupledSolution& solution, const CoupledD
     for (Index i = 0; i < size; ++i) variance[i] = matrix.map().col(i).segment(i, size - i).squaredNorm();
     return std::pair<VectorXd, VectorXd>(-matrix.map().row(size).head(size).transpose(), variance);
   };
-  for (Index i = 0; i < points_; ++i) {
-    const auto [error, variance] = left_out({i});
-    leave_one_out_mean_.row(i) = data.y.row(i) - error.transpose();
-    leave_one_out_variance_.row(i) = variance.transpose();
+  for (const PoseGroup& pose : pose_groups(data.q)) {
+    const auto count = static_cast<Index>(pose.size());
+    const auto [error, variance] = left_out(pose);
+    leave_one_out_mean_(pose, Eigen::all) = data.y(pose, Eigen::all) - error.reshaped(count, outputs);
+    leave_one_out_variance_(pose, Eigen::all) = variance.reshaped(count, outputs);
   }
   double surprise = 0;
   for (Index fold = 0; fold < kThreefold; ++fold) {

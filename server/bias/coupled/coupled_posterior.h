@@ -41,8 +41,8 @@ class CoupledPosterior {
   [[nodiscard]] const Eigen::VectorXd& weights() const { return weights_; }
   [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
 
-  /// N x D: each pose predicted with all its outputs left out; mean, and variance of the measurement (Rasmussen &
-  /// Williams, eqs. 5.10-5.12, with blocks of C⁻¹ instead of its diagonal).
+  /// N x D: each row predicted with all outputs of all rows of its joint vector left out; mean, and variance of the
+  /// measurement (Rasmussen & Williams, eqs. 5.10-5.12, with blocks of C⁻¹ instead of its diagonal).
   [[nodiscard]] const Eigen::MatrixXd& leave_one_out_mean() const { return leave_one_out_mean_; }
   [[nodiscard]] const Eigen::MatrixXd& leave_one_out_variance() const { return leave_one_out_variance_; }
   /// Mean square of the standardised errors in threefold cross-validation by runs of ten poses, with the

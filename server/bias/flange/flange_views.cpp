@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+
+#include "server/bias/pose_groups.h"
 
 namespace trammel {
 namespace {
@@ -11,28 +12,13 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kSameLever = 1e-3;   // m: what a calibration moves a tool by teaches no rotation
-constexpr double kSameJoints = 1e-6;  // rad, m: as repeats are told
-constexpr double kLeastSeen = 1e-9;   // singular value over the largest: what is below it is not seen
+constexpr double kSameLever = 1e-3;  // m: what a calibration moves a tool by teaches no rotation
+constexpr double kLeastSeen = 1e-9;  // singular value over the largest: what is below it is not seen
 
 Vector3 mean_lever(const std::vector<BiasFeatures>& features) {
   Vector3 sum = Vector3::Zero();
   for (const BiasFeatures& one : features) sum += one.lever_F;
   return sum / static_cast<double>(features.size());
-}
-
-/// The rows of each joint vector, in the order of their first.
-std::vector<std::vector<Index>> together(const MatrixXd& q) {
-  std::map<std::vector<long long>, std::size_t> place;
-  std::vector<std::vector<Index>> groups;
-  for (Index i = 0; i < q.rows(); ++i) {
-    std::vector<long long> key;
-    for (Index j = 0; j < q.cols(); ++j) key.push_back(std::llround(q(i, j) / kSameJoints));
-    const auto [at, is_new] = place.try_emplace(std::move(key), groups.size());
-    if (is_new) groups.emplace_back();
-    groups[at->second].push_back(i);
-  }
-  return groups;
 }
 
 FlangeView view_of(std::vector<Index> rows, const FlangeViews& all) {
@@ -81,7 +67,7 @@ FlangeViews views_of(const MatrixXd& q, const VectorXd& noise_shape, const std::
   all.reference_F = mean_lever(features);
   for (const BiasFeatures& one : features) all.seen.push_back(seen_through(one, all.reference_F));
   std::vector<Index> first;
-  for (std::vector<Index>& rows : together(q)) {
+  for (std::vector<Index>& rows : pose_groups(q)) {
     first.push_back(rows.front());
     take(&all, view_of(std::move(rows), all));
   }

@@ -31,7 +31,7 @@ class FlangeOutputs final : public BiasOutputs {
         features_(std::move(solution.features)),
         precision_(-solution.eliminated.map().topLeftCorner(views_.size, views_.size)) {
     weigh(solution.alpha);
-    leave_out(numbers_of(views_, y).of_twist, solution.alpha, y);
+    leave_out(numbers_of(views_, y).of_twist, solution.alpha, y.rows());
   }
 
   MatrixXd mean(const MatrixXd& q, const std::vector<BiasFeatures>& features) const override {
@@ -180,10 +180,8 @@ class FlangeOutputs final : public BiasOutputs {
     return cross;
   }
 
-  // Rows: each without itself, but with the others of its joint vector, as every other bias leaves them out. Share: of
-  // a joint vector without all of its rows; a target has none.
-  void leave_out(const VectorXd& z, const VectorXd& alpha, const MatrixXd& y) {
-    const Index rows = y.rows();
+  // Rows: each without all of its joint vector, as every other bias leaves them out. A target has none of them.
+  void leave_out(const VectorXd& z, const VectorXd& alpha, Index rows) {
     leave_one_out_mean_ = leave_one_out_variance_ = MatrixXd::Zero(rows, kOfOneUnit);
     leave_one_out_share_.resize(rows);
     for (const FlangeView& view : views_.views) {
@@ -193,33 +191,14 @@ class FlangeOutputs final : public BiasOutputs {
       const MatrixXd unknown = precision_of(numbers).llt().solve(MatrixXd::Identity(r, r));  // noise included
       const VectorXd mean = z.segment(view.first, r) - unknown * alpha.segment(view.first, r);
       const MatrixXd known = view.basis * (unknown - noise_ * MatrixXd::Identity(r, r)) * view.basis.transpose();
-      MatrixXd measured = known;
-      measured.diagonal().array() += noise_;
-      const VectorXd even = even_rows(views_, view, y);
-      leave_rows_out(view, measured, even, view.basis * mean);
+      spread(view, view.basis * mean, &leave_one_out_mean_);
       for (std::size_t k = 0; k < view.rows.size(); ++k) {
         const Index row = view.rows[k];
         const Vector3 of_row = views_.noise_shape[row] * known.diagonal().segment<3>(3 * static_cast<Index>(k));
+        leave_one_out_variance_.row(row).array() = of_row.transpose().array() + views_.noise_shape[row] * noise_;
         leave_one_out_share_[row] = share_of(of_row, prior_at(views_.seen[static_cast<std::size_t>(row)]).diagonal());
       }
     }
-  }
-
-  // `measured`, `mean`: of the even rows of a view without all of them.
-  void leave_rows_out(const FlangeView& view, const MatrixXd& measured, const VectorXd& even, const VectorXd& mean) {
-    const Index n = even.size();
-    const MatrixXd precision = measured.llt().solve(MatrixXd::Identity(n, n));
-    const VectorXd alpha = precision * (even - mean);
-    VectorXd left(n), variance(n);
-    for (Index first = 0; first < n; first += 3) {
-      const Matrix3 own = precision.block<3, 3>(first, first).inverse();
-      left.segment<3>(first) = even.segment<3>(first) - own * alpha.segment<3>(first);
-      variance.segment<3>(first) = own.diagonal();
-    }
-    spread(view, left, &leave_one_out_mean_);
-    for (std::size_t k = 0; k < view.rows.size(); ++k)
-      leave_one_out_variance_.row(view.rows[k]) =
-          views_.noise_shape[view.rows[k]] * variance.segment<3>(3 * static_cast<Index>(k)).transpose();
   }
 
   KernelPtr kernel_;

@@ -99,7 +99,7 @@ MatrixXd target_features(const Kernel& kernel, const VectorXd& parameters, const
 }  // namespace
 
 ProfiledLikelihood::ProfiledLikelihood(std::shared_ptr<const Kernel> kernel, GpData data, GpPrior prior)
-    : kernel_(std::move(kernel)), data_(std::move(data)), prior_(std::move(prior)) {
+    : kernel_(std::move(kernel)), data_(std::move(data)), prior_(std::move(prior)), poses_(pose_groups(data_.q)) {
   TRAMMEL_CHECK(data_.y.rows() == size() && data_.noise_shape.size() == size());
   matrix_ = augmented_storage(size(), data_.y.cols());
   features_ = feature_table(*kernel_, data_.q);
@@ -186,7 +186,16 @@ VectorXd ProfiledLikelihood::contract(const VectorXd& parameters, double ratio, 
 
 double ProfiledLikelihood::leave_one_out_rms() const {
   double total = 0;
-  for (Index i = 0; i < size(); ++i) total += alpha_.map().row(i).squaredNorm() / (matrix_(i, i) * matrix_(i, i));
+  for (const PoseGroup& pose : poses_) {
+    if (pose.size() == 1) {
+      const Index i = pose.front();
+      total += alpha_.map().row(i).squaredNorm() / (matrix_(i, i) * matrix_(i, i));
+      continue;
+    }
+    const MatrixXd block = -matrix_.map()(pose, pose);  // of M⁻¹, lower triangle
+    const MatrixXd alpha = alpha_.map()(pose, Eigen::all);
+    total += block.llt().solve(alpha).squaredNorm();
+  }
   return std::sqrt(total / static_cast<double>(size()));
 }
 
@@ -203,6 +212,7 @@ std::optional<GaussianProcess> GaussianProcess::condition(std::shared_ptr<const 
   gp.signal_variance_ = std::exp(2.0 * hyperparameters.log_signal_stddev);
   gp.noise_variance_ = std::exp(2.0 * hyperparameters.log_noise_stddev);
   const double ratio = gp.noise_variance_ / gp.signal_variance_;
+  gp.q_ = q;
   gp.y_ = y;
   gp.noise_ = ratio * noise_shape;
 
@@ -229,9 +239,34 @@ void GaussianProcess::finish(VarianceForm form) {
   VectorXd prior(size_);
   kernel_->diagonal(parameters_, rows_of(*features_, 0, size_), prior.data());
   leave_one_out_mean_ = y_ - weights.cwiseQuotient(inverse_diagonal_);
-  leave_one_out_share_ = (inverse_diagonal_.cwiseInverse() - noise_).cwiseQuotient(prior).cwiseMax(0.0).cwiseMin(1.0);
+  left_out_variance_ = inverse_diagonal_.cwiseInverse();
+  leave_poses_out();
+  leave_one_out_share_ = (left_out_variance_ - noise_).cwiseQuotient(prior).cwiseMax(0.0).cwiseMin(1.0);
   if (form == VarianceForm::kCompressed || form == VarianceForm::kCompressedOnly) compress(kMostKeptPoints);
   if (form == VarianceForm::kCompressedOnly && compressed_) exact_ = {};
+}
+
+void GaussianProcess::leave_poses_out() {
+  std::vector<PoseGroup> several = pose_groups(q_);
+  std::erase_if(several, [](const PoseGroup& pose) { return pose.size() == 1; });
+  if (several.empty()) return;
+  const std::vector<double> root = root_rows(0);
+  for (const PoseGroup& pose : several) {
+    const auto count = static_cast<Index>(pose.size());
+    MatrixXd block = MatrixXd::Zero(count, count);  // of M⁻¹ = Gᵀ G, G = L⁻¹
+    VectorXd part = VectorXd::Zero(count);
+    for (Index i = pose.front(); i < size_; ++i) {
+      const double* row = root.data() + i * (i + 1) / 2;
+      for (Index c = 0; c < count; ++c) {
+        const Index point = pose[static_cast<std::size_t>(c)];
+        part[c] = point <= i ? row[point] : 0.0;
+      }
+      block.selfadjointView<Eigen::Lower>().rankUpdate(part);
+    }
+    const MatrixXd left = block.llt().solve(MatrixXd::Identity(count, count));
+    leave_one_out_mean_(pose) = y_(pose) - left * weights_.map().col(0)(pose);
+    left_out_variance_(pose) = left.diagonal();
+  }
 }
 
 std::vector<double> GaussianProcess::root_rows(Index more) const {

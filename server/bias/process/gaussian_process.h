@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/bias/kernels/kernel.h"
+#include "server/bias/pose_groups.h"
 #include "server/bias/process/near_points.h"
 #include "server/bias/process/variance_table.h"
 #include "server/numerics/aligned_matrix.h"
@@ -47,7 +48,8 @@ class ProfiledLikelihood {
   /// False where M is not positive definite, or a parameter is beyond kMostLogParameter.
   [[nodiscard]] bool evaluate(const Eigen::VectorXd& parameters, ObjectiveValue* out);
 
-  /// Both of the last evaluation that succeeded: σ_f² of each output, m²; rms of the Euclidean leave-one-out error, m.
+  /// Both of the last evaluation that succeeded: σ_f² of each output, m²; rms of the Euclidean error of each point
+  /// predicted from all other joint vectors, m.
   [[nodiscard]] const Eigen::VectorXd& signal_variance() const { return signal_variance_; }
   [[nodiscard]] double leave_one_out_rms() const;
 
@@ -61,6 +63,7 @@ class ProfiledLikelihood {
   std::shared_ptr<const Kernel> kernel_;
   GpData data_;
   GpPrior prior_;
+  std::vector<PoseGroup> poses_;
   AlignedMatrix matrix_;  // [M Yᵀ], then [-M⁻¹; Y M⁻¹]; lower triangle
   AlignedMatrix features_;
   AlignedMatrix alpha_;  // M⁻¹ Y
@@ -140,14 +143,13 @@ class GaussianProcess {
   [[nodiscard]] double noise_variance() const { return noise_variance_; }
   [[nodiscard]] double log_likelihood() const { return log_likelihood_; }
 
-  /// Every training point predicted from all the others: mean, m, and posterior over prior variance of the function
-  /// (Rasmussen & Williams, eqs. 5.10-5.12).
+  /// Every training point predicted from those at all other joint vectors: mean, m, and posterior over prior variance
+  /// of the function. For the points p of one joint vector, Rasmussen & Williams, eqs. 5.10-5.12, with a block of K⁻¹
+  /// instead of its diagonal: μ_p = y_p - [K⁻¹]_pp⁻¹ [K⁻¹ y]_p, Σ_p = [K⁻¹]_pp⁻¹ (noise included).
   [[nodiscard]] const Eigen::VectorXd& leave_one_out_mean() const { return leave_one_out_mean_; }
   [[nodiscard]] const Eigen::VectorXd& leave_one_out_share() const { return leave_one_out_share_; }
-  /// Variance of the measurement of every training point given all the others, m².
-  [[nodiscard]] Eigen::VectorXd leave_one_out_variance() const {
-    return signal_variance_ * inverse_diagonal_.cwiseInverse();
-  }
+  /// Variance of the measurement of every training point given those at all other joint vectors, m².
+  [[nodiscard]] Eigen::VectorXd leave_one_out_variance() const { return signal_variance_ * left_out_variance_; }
 
  private:
   GaussianProcess() = default;
@@ -155,6 +157,8 @@ class GaussianProcess {
   [[nodiscard]] GaussianProcess like(Eigen::Index size) const;
   // Computes what follows from data, weights, inverse diagonal and root.
   void finish(VarianceForm form);
+  // Leaves out the points of each joint vector together.
+  void leave_poses_out();
   void compress(Eigen::Index at_most);
   // Chooses what variances are served from, by what it makes of the points left out and at the rows of `q`.
   void make_served(const Eigen::MatrixXd& q, bool as_part);
@@ -171,6 +175,7 @@ class GaussianProcess {
   Eigen::VectorXd parameters_;
   Eigen::Index size_ = 0;
   std::shared_ptr<AlignedMatrix> features_;
+  Eigen::MatrixXd q_;  // N x n, rad: which points stand at one joint vector
   Eigen::VectorXd y_;
   Eigen::VectorXd noise_;             // relative to σ_f²
   AlignedMatrix weights_;             // M⁻¹ y
@@ -182,6 +187,7 @@ class GaussianProcess {
   double signal_variance_ = 0;
   double noise_variance_ = 0;
   double log_likelihood_ = 0;
+  Eigen::VectorXd left_out_variance_;  // relative to σ_f², noise included
   Eigen::VectorXd leave_one_out_mean_;
   Eigen::VectorXd leave_one_out_share_;
 };

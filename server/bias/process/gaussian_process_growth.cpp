@@ -36,6 +36,8 @@ std::optional<GaussianProcess> GaussianProcess::with(const MatrixXd& q, const Ve
   GaussianProcess gp = like(size);
   gp.features_->map().topRows(size_) = features_->map().topRows(size_);
   kernel_->features(parameters_, q, gp.features_->data() + size_, gp.features_->rows());
+  gp.q_.resize(size, q.cols());
+  gp.q_ << q_, q;
   gp.y_ << y_, y;
   gp.noise_ << noise_, noise_variance_ / signal_variance_ * noise_shape;
   gp.weights_.map().topRows(size_) = weights_.map().topRows(size_);
@@ -104,6 +106,7 @@ GaussianProcess GaussianProcess::without(const std::vector<Index>& points, Varia
   const Index size = root.size();
   GaussianProcess gp = like(size);
   gp.features_->map().topRows(size) = features_->map()(kept, Eigen::all);
+  gp.q_ = q_(kept, Eigen::all);
   gp.y_ = y_(kept);
   gp.noise_ = noise_(kept);
   gp.weights_.map().col(0).head(size) = weights;
