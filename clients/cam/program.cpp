@@ -78,6 +78,21 @@ std::string called(const ProgramTool& tool) {
 
 namespace {
 
+/// Takes the targets out of the program that `leave` says; motions go to the others.
+void remove_targets(Program& program, const std::vector<bool>& leave) {
+  std::vector<std::size_t> now(program.targets.size());
+  std::vector<ProgramTarget> kept;
+  for (std::size_t t = 0; t < program.targets.size(); ++t) {
+    now[t] = kept.size();
+    if (!leave[t]) kept.push_back(std::move(program.targets[t]));
+  }
+  program.targets = std::move(kept);
+  for (ProgramMove& move : program.moves) {
+    std::erase_if(move.targets, [&](std::size_t t) { return leave[t]; });
+    for (std::size_t& t : move.targets) t = now[t];
+  }
+}
+
 /// Whether one of the motions [first, end) of an arc is left.
 bool arc_is_left(const Program& program, const std::vector<bool>& leave, std::size_t first, std::size_t end) {
   return std::any_of(program.moves.begin() + static_cast<std::ptrdiff_t>(first),
@@ -88,6 +103,32 @@ bool arc_is_left(const Program& program, const std::vector<bool>& leave, std::si
 }
 
 }  // namespace
+
+void leave_targets_in(Program& program, const std::set<std::string>& files) {
+  std::vector<bool> leave(program.targets.size(), false);
+  std::set<std::string> unused;
+  for (std::size_t t = 0; t < program.targets.size(); ++t) {
+    const ProgramTarget& target = program.targets[t];
+    const std::string& file = program.files[target.file].name;
+    if (!files.contains(file)) continue;
+    leave[t] = true;
+    if (target.used_at.empty()) {
+      unused.insert(file);
+      continue;
+    }
+    program.left.push_back({target.name, target.file, target.line, target.motion,
+                            "it stands in a system file of the controller, which a run over a folder leaves as it is; "
+                            "hand that file over by its name to have it corrected"});
+  }
+  if (std::find(leave.begin(), leave.end(), true) == leave.end()) return;
+  for (ProgramMove& move : program.moves)
+    move.left_some = move.left_some ||
+                     std::any_of(move.targets.begin(), move.targets.end(), [&](std::size_t t) { return leave[t]; });
+  for (const std::string& file : unused)
+    program.notes.push_back(
+        fmt::format("positions in {}, a system file of the controller, are left as they are", file));
+  remove_targets(program, leave);
+}
 
 void leave_halves_of_arcs(Program& program) {
   std::vector<bool> leave(program.targets.size(), false);
@@ -121,18 +162,7 @@ void leave_halves_of_arcs(Program& program) {
       }
     }
   }
-  if (!any) return;
-  std::vector<std::size_t> now(program.targets.size());
-  std::vector<ProgramTarget> kept;
-  for (std::size_t t = 0; t < program.targets.size(); ++t) {
-    now[t] = kept.size();
-    if (!leave[t]) kept.push_back(std::move(program.targets[t]));
-  }
-  program.targets = std::move(kept);
-  for (ProgramMove& move : program.moves) {
-    std::erase_if(move.targets, [&](std::size_t t) { return leave[t]; });
-    for (std::size_t& t : move.targets) t = now[t];
-  }
+  if (any) remove_targets(program, leave);
 }
 
 int line_of(const std::string& text, std::size_t at) {

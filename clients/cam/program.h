@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -169,12 +170,15 @@ struct ReadOptions {
   bool split = false;                       ///< a target that is used with two tools or frames becomes two
   bool keep_joints = false;                 ///< joint targets stay as they are
   std::map<std::string, Pose> frames = {};  ///< values of tools and frames that the files leave open, by name
+  std::set<std::string> spared = {};        ///< files that are read and not written
 };
 
 /// A tool of the list that is the same to every motion: name, place, and what it carries.
 [[nodiscard]] bool same_tool_of_program(const ProgramTool& a, const ProgramTool& b);
 /// `spindle`, `spindle carrying lPart`
 [[nodiscard]] std::string called(const ProgramTool& tool);
+/// Leaves the targets that stand in files of these names: those that a motion goes to are told, with the reason.
+void leave_targets_in(Program& program, const std::set<std::string>& files);
 /// Leaves the other target of each arc that one is left of: half an arc corrected is another arc.
 void leave_halves_of_arcs(Program& program);
 

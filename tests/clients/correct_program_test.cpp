@@ -155,6 +155,33 @@ TEST_F(CorrectProgram, AFolderComesBackAsAFolder) {
   EXPECT_EQ(text("back/m.mod"), text("in/m.mod"));
 }
 
+/// A KUKA folder as its archive has it: a position that a motion of the program goes to stands in the controller's own
+/// file.
+void write_krl_folder(const test::TemporaryFolder& folder, const std::string& under) {
+  const std::string config = read_text_file(kPrograms + "$config.dat").value();
+  for (const char* place : {"/KRC/R1/System", "/KRC/R1/Program"}) fs::create_directories(folder.file(under + place));
+  folder.write(under + "/KRC/R1/System/$config.dat",
+               config.substr(0, config.rfind("ENDDAT")) +
+                   "DECL E6POS XHOME={X 0.0,Y 125.0,Z 100.0,A 0.0,B 90.0,C 0.0,S 2,T 0}\nENDDAT\n");
+  const std::string drill = read_text_file(kPrograms + "drill.src").value();
+  folder.write(under + "/KRC/R1/Program/drill.src", drill.substr(0, drill.rfind("END")) + "PTP XHOME\nEND\n");
+  folder.write(under + "/KRC/R1/Program/drill.dat", read_text_file(kPrograms + "drill.dat").value());
+}
+
+TEST_F(CorrectProgram, AFolderRunLeavesTheControllersOwnFilesAsTheyAre) {
+  write_krl_folder(folder_, "in");
+  const std::string config = "/KRC/R1/System/$config.dat", program = "/KRC/R1/Program/drill.dat";
+  EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out"), "--receipt", file("r.csv")}), kNotAll);
+  EXPECT_EQ(text("out" + config), text("in" + config));
+  EXPECT_FALSE(exists("out" + config + ".original"));
+  EXPECT_NE(text("out" + program), text("in" + program)) << "the program itself is corrected";
+  EXPECT_NE(text("r.csv").find("system file of the controller"), std::string::npos) << text("r.csv");
+  EXPECT_EQ(correct({"--model", model(), file("in" + config), file("in/KRC/R1/Program/drill.src"), file("in" + program),
+                     "-o", file("asked/")}),
+            0);
+  EXPECT_NE(text("asked/$config.dat"), text("in" + config)) << "asked for by its name";
+}
+
 TEST_F(CorrectProgram, ThePageHoldsEverythingItShows) {
   ASSERT_EQ(correct({"--model", model(), module("m.mod"), "-o", file("out.mod"), "--report", file("page.html"),
                      "--tolerance", "0.2", "--json", file("r.json")}),

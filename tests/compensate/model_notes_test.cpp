@@ -100,6 +100,7 @@ TEST(ModelNotes, WhatIsLeftIsHeldAgainstTheStatedSigma) {
   const auto left = [](double times) {
     CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
     parts.training.poses = 60;
+    parts.discrepancy = times * parts.physics.cell->tracker.sigma;
     parts.training.compensated.rms = times * std::sqrt(3.0) * parts.physics.cell->tracker.sigma;
     std::vector<Note> notes = notes_of(test::demand(CompensatedModel::make(parts)));
     std::erase_if(notes, [](const Note& note) { return note.code != "left_over_sigma"; });

@@ -381,9 +381,12 @@ void add_correct(CLI::App& app, Action& chosen) {
   const auto arguments = std::make_shared<CorrectArguments>();
   CLI::App* command = app.add_subcommand("correct", "Find what to command so that the tool lands where it is wanted");
   command
-      ->add_option("input", arguments->inputs,
-                   "A robot program: its files, its folder, or '-' for standard input; or targets in the robot's base "
-                   "(.csv: positions in mm, joints in deg, rails in mm)")
+      ->add_option(
+          "input", arguments->inputs,
+          "A robot program: its files, its folder, or '-' for standard input; or targets in the robot's base "
+          "(.csv: positions in mm, joints in deg, rails in mm). Programmed off line: a position that was taught by "
+          "jogging the robot to it holds the robot's error already, and gets worse by all of it; so does one in a "
+          "frame that was touched with the robot")
       ->required();
   command
       ->add_option(

@@ -1,6 +1,7 @@
 #include "clients/cli/files/program_files.h"
 
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <iostream>
 #include <iterator>
@@ -38,6 +39,20 @@ std::vector<Found> programs_in(const std::string& folder, const std::optional<ca
   return found;
 }
 
+/// Whether a file of a folder belongs to the controller and not to a program: KUKA's `$config.dat` and its folders
+/// System, Mada and Steu, ABB's system modules and parameters.
+bool is_of_the_controller(const std::string& name) {
+  static const std::set<std::string> kFolders = {"system", "mada", "steu", "sysmod", "syspar"};
+  const fs::path path(name);
+  if (path.filename().string().starts_with('$')) return true;
+  return std::any_of(path.begin(), path.end(), [&](const fs::path& part) {
+    std::string lower = part.string();
+    std::transform(lower.begin(), lower.end(), lower.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return kFolders.contains(lower);
+  });
+}
+
 Result<std::string> standard_input() {
   std::string text{std::istreambuf_iterator<char>(std::cin), {}};
   if (text.size() > kLargest) return failure(ErrorCode::kTooLarge, "more than {} bytes", kLargest).in("standard input");
@@ -73,6 +88,8 @@ Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, 
       const std::vector<Found> inside = programs_in(input, wanted);
       if (inside.empty()) return refused("a folder without programs").in(input);
       found.insert(found.end(), inside.begin(), inside.end());
+      for (const Found& file : inside)
+        if (is_of_the_controller(file.name)) program.system.insert(file.name);
       program.from_folder = true;
     } else {
       found.push_back({input == "-" ? "standard input" : fs::path(input).filename().string(), input});

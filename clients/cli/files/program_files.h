@@ -2,6 +2,7 @@
 
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,8 @@ struct ProgramFiles {
   std::vector<cam::SourceFile> files;
   std::vector<std::string> paths;  ///< of each file; `-` is standard input
   bool from_folder = false;        ///< the output is a folder too
+  std::set<std::string> system =
+      {};  ///< names of files that belong to the controller and were found in a folder: read, not written
 };
 
 /// Whether the inputs are a robot program. Otherwise they are one table of targets (.csv).
