@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <unsupported/Eigen/SpecialFunctions>
 
 namespace trammel {
 
@@ -136,7 +137,20 @@ Eigen::MatrixXd correlation_of(const Eigen::MatrixXd& deviations) {
 
 }  // namespace
 
-double FleetParameter::next_stddev() const { return spread * std::sqrt(1 + 1.0 / std::max(robots, 1)); }
+double FleetParameter::next_stddev() const {
+  constexpr double kNormalOverStudent = 1.45;  // variance of normal values over the square of the scale that is learned
+  const double n = std::max(robots, 2);
+  return spread * std::sqrt(kNormalOverStudent * (n + 1) / (n - 1) * (1 + 1 / n));
+}
+
+namespace {
+
+/// How probable it is that a value of Student's t with `freedom` degrees of freedom is farther from 0 than `t`.
+double two_sided(double t, double freedom) {
+  return Eigen::numext::betainc(0.5 * freedom, 0.5, freedom / (freedom + t * t));
+}
+
+}  // namespace
 
 const FleetParameter* FleetPrior::find(const std::string& name) const {
   const auto found =
@@ -221,7 +235,8 @@ std::vector<Unlike> unlike_twins(const std::vector<IdentifiedParameter>& paramet
     const double value = (posterior * one.value - prior * one.parameter.prior) / said;
     const double stddev = twin->next_stddev();
     const double z = (value - twin->mean) / std::sqrt(1 / said + stddev * stddev);
-    if (std::abs(z) < kUnlikeAt) continue;
+    const double asked = static_cast<double>(fleet.parameters.size()) * (fleet.robots + 1);
+    if (asked * two_sided(z, std::max(1, fleet.robots - 1)) > kFalseFleets) continue;
     const double scale = one.parameter.scale;
     all.push_back({one.parameter.name, one.parameter.unit, value * scale, twin->mean * scale, stddev * scale, z});
   }

@@ -80,6 +80,32 @@ TEST_F(FleetTest, AnOddRobotIsNamedAndWidensNoSpread) {
   EXPECT_TRUE(unlike_twins(member(50).model.parts(), with_odd).empty());
 }
 
+TEST_F(FleetTest, OfFleetsOfOneLawAtMostOneInTwentyHasARobotThatIsCalledUnlike) {
+  constexpr int kFleets = 40;
+  for (const int robots : {4, 8}) {
+    int with_one = 0;
+    for (int f = 0; f < kFleets; ++f) {
+      bool any = false;
+      for (int odd = 0; odd < robots; ++odd) {
+        std::vector<FleetMember> others;
+        for (int k = 0; k < robots; ++k)
+          if (k != odd) others.push_back(member(1000 * robots + 20 * f + k));
+        const FleetPrior prior = demand(learn_fleet_prior(cell_->robot, others));
+        any |= !unlike_twins(member(1000 * robots + 20 * f + odd).model.parts(), prior).empty();
+      }
+      with_one += any;
+    }
+    EXPECT_LE(with_one, 5) << robots << " robots: of 40 fleets two are expected at the most, six in one of fifty tries";
+  }
+}
+
+TEST_F(FleetTest, AnOddOneAmongEightIsStillNamed) {
+  const FleetPrior prior = demand(learn_fleet_prior(cell_->robot, fleet(7)));
+  const std::vector<Unlike> unlike = unlike_twins(member(99, {{"C3", 3.0}}).model.parts(), prior);
+  ASSERT_EQ(unlike.size(), 1u);
+  EXPECT_EQ(unlike.front().parameter, "C3");
+}
+
 TEST_F(FleetTest, TwoTwinsSayNothing) {
   const auto prior = learn_fleet_prior(cell_->robot, fleet(2));
   ASSERT_FALSE(prior);
