@@ -121,6 +121,7 @@ class Offline(unittest.TestCase):
     def test_evaluates_with_the_keys_and_figures_of_the_command_line(self):
         printed = json.loads(command_line("evaluate", "--model", self.model_path, "--batch", self.batch_path, "--json", "-"))
         printed.pop("structure", None)
+        self.assertEqual(printed.pop("notes"), self.model.notes)
         here = self.model.evaluate(trammel.Batch.load(self.batch_path))
         self.assertEqual(json.loads(json.dumps(here)), printed)
 
