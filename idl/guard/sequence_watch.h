@@ -17,7 +17,8 @@ class SequenceWatch {
  public:
   using Time = std::chrono::steady_clock::time_point;
   static constexpr std::int64_t kFreely = 4096;  ///< numbers skipped without counting them
-  static constexpr std::int64_t kHeartbeatStep = std::int64_t{1} << 22;
+  /// Under half a second on a slow host: who stands still for longer than a lease takes himself for one that slept.
+  static constexpr std::int64_t kHeartbeatStep = std::int64_t{1} << 20;
   static constexpr std::int64_t kGapStep = std::int64_t{1} << 17;
   static constexpr std::uint32_t kCountStep = 1u << 24;
 
