@@ -137,7 +137,9 @@ struct Reading {
   const ShownPoses::Orientations* orientations = nullptr;
   Distance distance;
 
-  [[nodiscard]] const std::vector<Matrix3>* R() const { return orientations == nullptr ? nullptr : &orientations->R; }
+  [[nodiscard]] const std::vector<Matrix3>* rotations() const {
+    return orientations == nullptr ? nullptr : &orientations->R;
+  }
 };
 
 std::vector<const ShownPoses::Orientations*> meanings(const ShownPoses& shown) {
@@ -152,7 +154,7 @@ Reading nearest(const Cell& cell, const ShownPoses& shown, const Comparison& com
   for (const Frames& frames : known_frames(cell)) {
     for (const ShownPoses::Orientations* orientations : meanings(shown)) {
       Reading reading{frames, orientations, {}};
-      reading.distance = comparison.distance(comparison.residuals(cell.robot, frames, reading.R()));
+      reading.distance = comparison.distance(comparison.residuals(cell.robot, frames, reading.rotations()));
       if (!best || reading.distance.worst < best->distance.worst) best = std::move(reading);
     }
   }
@@ -244,12 +246,13 @@ Eigen::VectorXd fitted(const Chain& robot, const std::vector<FileNumber>& number
   const auto count = static_cast<Eigen::Index>(numbers.size());
   Eigen::VectorXd by = Eigen::VectorXd::Zero(count);
   for (int step = 0; step < kSteps; ++step) {
-    const Eigen::VectorXd r = comparison.residuals(changed(robot, numbers, by), reading.frames, reading.R());
+    const Eigen::VectorXd r = comparison.residuals(changed(robot, numbers, by), reading.frames, reading.rotations());
     Eigen::MatrixXd J(r.size(), count);
     for (Eigen::Index k = 0; k < count; ++k) {
       Eigen::VectorXd near = by;
       near(k) += kDifference;
-      J.col(k) = (comparison.residuals(changed(robot, numbers, near), reading.frames, reading.R()) - r) / kDifference;
+      J.col(k) =
+          (comparison.residuals(changed(robot, numbers, near), reading.frames, reading.rotations()) - r) / kDifference;
     }
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> decomposition;
     decomposition.setThreshold(1e-7);
@@ -299,7 +302,7 @@ std::vector<std::pair<std::string, Chain>> other_senses(const Chain& robot) {
 std::vector<std::string> explanations(const Chain& robot, const Reading& reading, const Comparison& comparison) {
   std::vector<std::string> found;
   const auto explains = [&](const Chain& arm) {
-    return comparison.distance(comparison.residuals(arm, reading.frames, reading.R())).worst <= 1;
+    return comparison.distance(comparison.residuals(arm, reading.frames, reading.rotations())).worst <= 1;
   };
   for (const auto& [text, arm] : other_senses(robot))
     if (explains(arm)) found.push_back(text);
