@@ -20,7 +20,7 @@ constexpr double kAsked = 3;        // times the stated sigma: the least that a 
 constexpr double kKept = 0.55;      // share of the rows that are fitted: with two bad ones in five, some are spared
 constexpr double kAgreeing = 0.6;   // share that must agree at the end
 constexpr double kMuchLess = 0.25;  // of what was left
-constexpr double kEquations = 2;    // for each parameter, of the rows that are fitted
+constexpr double kEquations = 1.5;  // for each parameter, of the rows that are fitted
 constexpr std::size_t kMostRows = 300;  // evenly drawn beyond, while rows are looked for
 constexpr int kMostSteps = 12;
 
