@@ -48,17 +48,6 @@ VectorXd negative_log_density(const MatrixXd& error, const MatrixXd& stddev) {
   return (0.5 * z.square() + stddev.array().log() + constant).rowwise().sum();
 }
 
-/// The rows (rising) of some poses.
-std::vector<Index> rows_of(const std::vector<PoseGroup>& poses, const std::vector<Index>& some) {
-  std::vector<Index> rows;
-  for (const Index p : some) {
-    const PoseGroup& pose = poses[static_cast<std::size_t>(p)];
-    rows.insert(rows.end(), pose.begin(), pose.end());
-  }
-  std::sort(rows.begin(), rows.end());
-  return rows;
-}
-
 /// The sum of `of_row` over the rows of each pose.
 VectorXd by_pose(const std::vector<PoseGroup>& poses, const VectorXd& of_row) {
   VectorXd sum(std::ssize(poses));
@@ -77,12 +66,8 @@ struct Fold {
 std::vector<Fold> folds(const BiasProblem& problem, const std::vector<PoseGroup>& poses, const MatrixXd& table,
                         const ResidualWithout& residual_without) {
   const std::vector<Index> observations = in_order(problem.q.rows());
-  std::vector<Index> first;
-  for (const PoseGroup& pose : poses) first.push_back(pose.front());
   std::vector<Fold> all;
-  for (const std::vector<Index>& neighbours :
-       halved(table(first, Eigen::all), (std::ssize(poses) + kBlocks - 1) / kBlocks)) {
-    const std::vector<Index> block = rows_of(poses, neighbours);
+  for (const std::vector<Index>& block : halved(table, poses, (std::ssize(poses) + kBlocks - 1) / kBlocks)) {
     std::optional<MatrixXd> residual_B = residual_without ? residual_without(block) : problem.residual_B;
     if (!residual_B) continue;
     Fold fold{block, {}, *std::move(residual_B)};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "server/calibrate/frames/frames.h"
 #include "server/calibrate/gauges/campaign_limits.h"
@@ -42,10 +43,11 @@ Eigen::Index place_of_base(const PhysicalModel& model) {
   return -1;
 }
 
-/// Unknown frames by the nominal chain, refined together and taken over as the model's. Beside an unknown tool a base
-/// that is known and to be identified is free, too: the instrument may stand elsewhere.
-Status find_frames(PhysicalModel& model, const MeasurementBatch& batch, const CalibrateOptions& options) {
-  if (Status located = locate_unknown_frames(model, batch); !located) return located;
+bool has_unknown_frame(const Cell& cell) { return !cell.X_WB || has_unknown_tool(cell); }
+
+/// Unknown frames where the closed forms put them, refined together and taken over as the model's. Beside an unknown
+/// tool a base that is known and to be identified is free, too: the instrument may stand elsewhere.
+Status refine_frames(PhysicalModel& model, const MeasurementBatch& batch, const CalibrateOptions& options) {
   const bool base_known = model.cell->X_WB.has_value();
   const bool tool_unknown = has_unknown_tool(*model.cell);
   std::vector<std::string> free;
@@ -135,6 +137,53 @@ Status place_instruments(PhysicalModel& model, const MeasurementBatch& batch, co
   return locate_anchors(model, batch);
 }
 
+/// Everything but the frames, which are where the model has them.
+Result<CalibrationResult> calibrate_placed(CalibrationProblem problem, const CalibrateOptions& options) {
+  if (Status fit = check_needs(problem); !fit) return tl::make_unexpected(fit.error());
+  localise_base(problem.model, problem.batch);
+  if (Status placed = place_instruments(problem.model, problem.batch, options); !placed)
+    return tl::make_unexpected(placed.error());
+  if (Status searched = search_orders(problem, options); !searched) return tl::make_unexpected(searched.error());
+  return identify_with_sessions(problem, options);
+}
+
+/// From a base that stands where the model has it.
+Result<CalibrationResult> calibrate_from(CalibrationProblem placed, const CalibrateOptions& options) {
+  if (has_unknown_frame(*placed.model.cell)) {
+    if (Status refined = refine_frames(placed.model, placed.batch, options); !refined)
+      return Failure(refined.error()).in("batch " + placed.batch.id);
+  }
+  return calibrate_placed(std::move(placed), options);
+}
+
+/// The most likely of those that begin at each of the places where the base may stand.
+Result<CalibrationResult> calibrate_located(const CalibrationProblem& problem, const CalibrateOptions& options) {
+  std::optional<Result<CalibrationResult>> best;
+  for (const Pose& X_WB : likely_bases(problem.model, problem.batch)) {
+    CalibrationProblem placed = problem;
+    placed.model.X_WB = X_WB;
+    Result<CalibrationResult> found = calibrate_from(std::move(placed), options);
+    if (!best || (found && (!*best || found->log_evidence > (*best)->log_evidence))) best = std::move(found);
+  }
+  if (const std::string untold = untold_turn(*problem.model.cell, problem.batch); *best && !untold.empty())
+    (*best)->unidentifiable.insert((*best)->unidentifiable.begin(),
+                                   UnidentifiableCombination{0, turn_of_base(), untold});
+  return std::move(*best);
+}
+
+/// The batch as if each session had been measured as `sessions` say; without sessions as it is.
+MeasurementBatch moved_there(const CalibrationProblem& problem, const std::vector<SessionSetting>& sessions) {
+  const Tracker& tracker = problem.model.cell->tracker;
+  return sessions.empty() ? problem.batch : moved(problem.batch, sessions, tracker.sigma, tracker.sigma_rotation);
+}
+
+/// `found` was identified on what `sessions` had moved.
+CalibrationResult told_of(CalibrationResult found, const std::vector<SessionSetting>& sessions) {
+  for (std::size_t s = 0; s < sessions.size(); ++s)
+    found.sessions[s].set_into_W(found.sessions[s].into_W() * sessions[s].into_W());
+  return found;
+}
+
 /// In the world of the last session.
 Result<CalibrationResult> calibrate_there(const CalibrationProblem& problem, const CalibrateOptions& options) {
   CalibrationProblem complete = problem;
@@ -143,23 +192,14 @@ Result<CalibrationResult> calibrate_there(const CalibrationProblem& problem, con
     Result<std::vector<SessionSetting>> located = locate_sessions(problem.model, problem.batch);
     if (!located) return tl::make_unexpected(located.error());
     sessions = std::move(*located);
-    const Tracker& tracker = problem.model.cell->tracker;
-    complete.batch = moved(problem.batch, sessions, tracker.sigma, tracker.sigma_rotation);
+    complete.batch = moved_there(problem, sessions);
   }
-  if (const Cell& cell = *problem.model.cell; !cell.X_WB || has_unknown_tool(cell)) {
-    if (Status found = find_frames(complete.model, complete.batch, options); !found) {
-      return Failure(found.error()).in("batch " + problem.batch.id);
-    }
+  if (has_unknown_frame(*problem.model.cell)) {
+    if (Status located = locate_unknown_frames(complete.model, complete.batch); !located)
+      return Failure(located.error()).in("batch " + problem.batch.id);
   }
-  if (Status fit = check_needs(complete); !fit) return tl::make_unexpected(fit.error());
-  localise_base(complete.model, complete.batch);
-  if (Status placed = place_instruments(complete.model, complete.batch, options); !placed)
-    return tl::make_unexpected(placed.error());
-  if (Status searched = search_orders(complete, options); !searched) return tl::make_unexpected(searched.error());
-  return identify_with_sessions(complete, options).map([&](CalibrationResult found) {
-    for (std::size_t s = 0; s < sessions.size(); ++s)
-      found.sessions[s].set_into_W(found.sessions[s].into_W() * sessions[s].into_W());
-    return found;
+  return calibrate_located(complete, options).map([&](CalibrationResult found) {
+    return told_of(std::move(found), sessions);
   });
 }
 
@@ -183,19 +223,42 @@ MeasurementBatch exchanged(MeasurementBatch batch, std::size_t session) {
   return batch;
 }
 
+/// `found` was told in the lengths of another session: once more in those of the newest, everything as it stands.
+Result<CalibrationResult> calibrate_in_newest_lengths(const CalibrationResult& found, const CalibrationProblem& problem,
+                                                      const CalibrateOptions& options) {
+  const double longer = 1 + found.sessions.back().scale;
+  std::vector<SessionSetting> sessions = settings_of(problem.batch);
+  for (std::size_t s = 0; s < sessions.size(); ++s) {
+    Similarity into_W = found.sessions[s].into_W();
+    into_W.X.translation() /= longer;
+    into_W.scale = (1 + into_W.scale) / longer - 1;
+    sessions[s].set_into_W(into_W);
+  }
+  CalibrationProblem there = problem;
+  there.batch = moved_there(problem, sessions);
+  there.model.tools = found.model.tools;
+  there.model.X_WB = found.model.X_WB;
+  there.model.X_WB.translation() /= longer;
+  return calibrate_placed(std::move(there), options).map([&](CalibrationResult again) {
+    return told_of(std::move(again), sessions);
+  });
+}
+
 /// Calibrated in the world of that session; told in that of the newest.
 Result<CalibrationResult> calibrate_by(std::size_t session, const CalibrationProblem& problem,
                                        const CalibrateOptions& options) {
   CalibrationProblem there = problem;
   there.batch = exchanged(problem.batch, session);
-  return calibrate_there(there, options).map([&](CalibrationResult found) {
-    std::swap(found.sessions[session], found.sessions.back());
-    const Pose back = found.sessions.back().X_WS.inverse();
-    for (SessionSetting& setting : found.sessions) setting.X_WS = back * setting.X_WS;
-    found.sessions.back().X_WS = Pose::Identity();
-    found.model.X_WB = back * found.model.X_WB;
-    return found;
+  Result<CalibrationResult> found = calibrate_there(there, options).map([&](CalibrationResult by_session) {
+    std::swap(by_session.sessions[session], by_session.sessions.back());
+    const Pose back = by_session.sessions.back().X_WS.inverse();
+    for (SessionSetting& setting : by_session.sessions) setting.X_WS = back * setting.X_WS;
+    by_session.sessions.back().X_WS = Pose::Identity();
+    by_session.model.X_WB = back * by_session.model.X_WB;
+    return by_session;
   });
+  return found && found->sessions.back().scale != 0 ? calibrate_in_newest_lengths(*found, problem, options)
+                                                    : std::move(found);
 }
 
 /// Whether nothing that is to be found depends on which world it is told in: not where the instrument drifts to.

@@ -4,10 +4,12 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/calibrate/frames/frames.h"
 #include "server/compensate/paired_gain.h"
 #include "server/compensate/session_changes.h"
 #include "server/error_sources/anchors.h"
 #include "server/robot/cell_doubts.h"
+#include "server/robot/gauge.h"
 #include "server/robot/robot_confirmation.h"
 
 namespace trammel {
@@ -190,25 +192,82 @@ void add_confirmation(const Cell& cell, std::vector<Note>& notes) {
                    "controller's, corrected poses land off by the difference"});
 }
 
-/// m, of an axis of a training pose. The discrepancy counts neither what the rows' own sigmas explain nor single bad
-/// poses, and the rms counts no bias.
-double left_of_an_axis(const CompensatedModel::Parts& parts) {
-  const double all = parts.training.compensated.rms / std::sqrt(3.0);
-  return std::min(all, std::hypot(parts.discrepancy, parts.physics.cell->tracker.sigma));
+/// m: what is left of an axis of a training pose, or of a gauge, and what was stated for it.
+struct LeftOver {
+  double left = 0, stated = 0;
+};
+
+/// `rms` is of all rows. The discrepancy counts neither what the rows' own sigmas explain nor single bad poses, and the
+/// rms counts no bias.
+LeftOver left_over(const CompensatedModel::Parts& parts, double rms, double stated) {
+  return {std::min(rms, std::hypot(parts.discrepancy, stated)), stated};
+}
+
+/// m, of one value of the least exact instrument of the cell.
+double stated_of_gauges(const Cell& cell) {
+  double stated = 0;
+  if (const Result<Anchors> anchors = anchors_of(cell)) {
+    for (const auto& [id, anchor] : *anchors) stated = std::max(stated, anchor.sigma.value_or(cell.tracker.sigma));
+  }
+  return stated > 0 ? stated : cell.tracker.sigma;
+}
+
+/// Of positions and of gauges, whichever is farther from what was stated.
+LeftOver worst_left_over(const CompensatedModel::Parts& parts) {
+  const Cell& cell = *parts.physics.cell;
+  LeftOver worst{0, cell.tracker.sigma};
+  if (parts.training.poses > 0)
+    worst = left_over(parts, parts.training.compensated.rms / std::sqrt(3.0), cell.tracker.sigma);
+  if (!parts.training.gauges) return worst;
+  const LeftOver gauges = left_over(parts, parts.training.gauges->compensated, stated_of_gauges(cell));
+  return gauges.left * worst.stated > worst.left * gauges.stated ? gauges : worst;
 }
 
 void add_left_over(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   constexpr double kLeads = 3, kStops = 30;  // times the stated sigma
-  const double sigma = parts.physics.cell->tracker.sigma;
-  const double left = left_of_an_axis(parts);
-  const double times = left / sigma;
-  if (parts.training.poses == 0 || !(times >= kLeads)) return;
+  const LeftOver worst = worst_left_over(parts);
+  const double times = worst.left / worst.stated;
+  if (!(times >= kLeads)) return;
   notes.push_back(
       {"left_over_sigma", times >= kStops ? Severity::kStop : Severity::kWarning,
        fmt::format("{:.0f} times the stated sigma is left at the training poses ({:.3f} mm an axis, stated {:.3f} mm): "
                    "the intervals "
                    "were widened to fit, so their coverage does not show that the model is right (trammel diagnose)",
-                   times, to_mm(left), to_mm(sigma))});
+                   times, to_mm(worst.left), to_mm(worst.stated))});
+}
+
+/// `3, 8, 11 and 4 more`
+std::string rows_of(const std::vector<SuspectPose>& suspects) {
+  constexpr std::size_t kMost = 40;
+  std::vector<int> rows;
+  for (const SuspectPose& pose : suspects) rows.push_back(pose.row);
+  std::sort(rows.begin(), rows.end());
+  const std::size_t shown = std::min(rows.size(), kMost);
+  const std::string text = fmt::format("{}", fmt::join(rows.begin(), rows.begin() + static_cast<long>(shown), ", "));
+  return shown < rows.size() ? fmt::format("{} and {} more", text, rows.size() - shown) : text;
+}
+
+void add_suspects(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
+  constexpr double kMany = 0.1;  // of all rows: more than single mistakes
+  const std::size_t count = parts.suspects.size();
+  if (count == 0) return;
+  const bool many = static_cast<double>(count) > kMany * (static_cast<double>(count) + parts.provenance.training_poses);
+  double worst = 0;
+  for (const SuspectPose& pose : parts.suspects) worst = std::max(worst, pose.distance);
+  notes.push_back(
+      {"rows_do_not_fit", many ? Severity::kStop : Severity::kWarning,
+       fmt::format("{} of the measured rows {} not fit the others, by up to {:.3g} mm, and hardly {}: {} {}; "
+                   "measure {} again",
+                   count, count == 1 ? "does" : "do", to_mm(worst), count == 1 ? "counts" : "count",
+                   count == 1 ? "row" : "rows", rows_of(parts.suspects), count == 1 ? "it" : "them")});
+}
+
+/// A base that the cell does not say, and whose turn the poses do not tell.
+void add_untold_turn(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
+  if (parts.physics.cell->X_WB) return;
+  for (const UnidentifiableCombination& one : parts.unidentifiable)
+    if (one.singular_value == 0 && one.parameters == turn_of_base())
+      notes.push_back({"base_turn_untold", Severity::kStop, one.sentence});
 }
 
 void add_cell_doubts(const Cell& cell, std::vector<Note>& notes) {
@@ -289,6 +348,8 @@ std::vector<Note> notes_of(const CompensatedModel& model) {
   add_what_data_added(model.parts(), notes);
   add_idle_sources(model.parts(), notes);
   add_left_over(model.parts(), notes);
+  add_suspects(model.parts(), notes);
+  add_untold_turn(model.parts(), notes);
   add_off_drawing(model.parts(), notes);
   add_cell_doubts(model.cell(), notes);
   add_moved_tools(model, notes);

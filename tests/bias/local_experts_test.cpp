@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/bias/process/halves.h"
 #include "server/bias/search/hyperparameter_search.h"
 #include "tests/bias/bias_data.h"
 
@@ -35,6 +36,43 @@ TEST(LocalExperts, AreOneExactProcessUpTo5000Points) {
   exact->mean(q, expected.data());
   EXPECT_EQ(mean, expected);
   EXPECT_EQ(local.leave_one_out_mean(), exact->leave_one_out_mean());
+}
+
+TEST(LocalExperts, NoneIsGivenAPartOfAPose) {
+  // Grids of two joints: many poses have the same value of the joint across which they are halved.
+  MatrixXd q = MatrixXd::Zero(3 * 700, 6);
+  for (Index row = 0; row < q.rows(); ++row) {
+    q(row, 1) = 0.05 * static_cast<double>(row % 700 / 27);
+    q(row, 2) = 0.05 * static_cast<double>(row % 700 % 27);
+  }
+  std::vector<int> part_of(static_cast<std::size_t>(q.rows()), -1);
+  int part = 0;
+  for (const std::vector<Index>& rows : halved(q, pose_groups(q), 40)) {
+    for (const Index row : rows) part_of[static_cast<std::size_t>(row)] = part;
+    ++part;
+  }
+  EXPECT_GE(part, 700 / 40);
+  for (std::size_t row = 0; row < 700; ++row) {
+    EXPECT_EQ(part_of[row], part_of[row + 700]);
+    EXPECT_EQ(part_of[row], part_of[row + 1400]);
+  }
+}
+
+TEST(LocalExperts, LeaveAllReflectorsOfAPoseOutTogether) {
+  // An error of each pose that no other pose shares: whoever is left out with the others of its pose is predicted as 0.
+  constexpr Index kPoses = 1700;
+  const MatrixXd at = random_joints(kPoses, 75);
+  const MatrixXd q = at.replicate(3, 1);
+  std::mt19937_64 random(76);
+  VectorXd y(kPoses);
+  for (double& value : y) value = 1e-4 * normal(&random);
+  GpHyperparameters rough = kSmooth;
+  rough.kernel = VectorXd::Constant(6, std::log(1e-2));
+  const auto local =
+      LocalExperts::condition(make_kernel("se"), q, y.replicate(3, 1), VectorXd::Ones(3 * kPoses), rough);
+  ASSERT_TRUE(local);
+  ASSERT_GT(local->experts(), 1U);
+  EXPECT_LT(local->leave_one_out_mean().cwiseAbs().maxCoeff(), 1e-9);
 }
 
 class ManyPoints : public testing::Test {

@@ -5,6 +5,7 @@
 #include "server/measurement/checked_batch.h"
 #include "tests/support/demand.h"
 #include "tests/support/misread_batch.h"
+#include "tests/support/one_point.h"
 #include "tests/support/virtual_robot.h"
 
 namespace trammel {
@@ -102,6 +103,28 @@ TEST(BatchCheck, ToolsMayTakeTurnsInAnyOrder) {
     const auto said = test::said_of(std::move(batch), *cell);
     EXPECT_FALSE(said) << "each " << every << ": " << sentence(*said);
   }
+}
+
+TEST(BatchCheck, OnePointSeenFromAllSidesWithAToolThatIsOffIsNotReadAsPositionsInUm) {
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const auto known = test::cell_of_one_point("{xyz_mm: [0, 0, 0]}", test::kToolOfOnePoint, "{error_sources: []}");
+    const auto unknown = test::cell_of_one_point("null", test::kToolOfOnePoint, "{error_sources: []}");
+    const Vector3 off = 1e-3 * Vector3(4, -3, 6);
+    const auto said = test::said_of(test::one_point(*known, off, Pose::Identity(), 30, seed), *known);
+    EXPECT_FALSE(said) << "seed " << seed << ": " << sentence(*said);
+    const Pose X_WB = make_pose(rotation_exp({0.3, -1.1, 1.9}), {1.2, -0.5, 0.3});
+    const auto elsewhere = test::said_of(test::one_point(*unknown, off, X_WB, 30, seed), *unknown);
+    EXPECT_FALSE(elsewhere) << "seed " << seed << ": " << sentence(*elsewhere);
+  }
+}
+
+TEST(BatchCheck, PositionsThatAreInUmAreStillNamed) {
+  const auto cell = test::cell_7();
+  MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 60, 3);
+  for (Measurement& m : batch.measurements) m.p_W *= 1000;
+  const auto said = test::said_of(std::move(batch), *cell);
+  ASSERT_TRUE(said);
+  EXPECT_EQ(said->text, "with all positions in um") << sentence(*said);
 }
 
 TEST(BatchCheck, WhatIsRefusedForALimitSaysUnderWhichReadingItWouldNotBe) {

@@ -10,6 +10,7 @@
 #include "server/plan/plan.h"
 #include "tests/support/demand.h"
 #include "tests/support/figure.h"
+#include "tests/support/one_point.h"
 #include "tests/support/refusal.h"
 #include "tests/support/virtual_robot.h"
 
@@ -87,6 +88,26 @@ TEST(Calibrate, FindsAnUnknownBaseAndTool) {
     const Result<CalibrationResult> result = calibrate(cell, specs, measured(robot, 200, 5, orientation), {});
     ASSERT_TRUE(result) << result.error().message;
     EXPECT_LE(validation_rms_mm(*result, measured(robot, 300, 6)), 0.026) << "orientation " << orientation;
+  }
+}
+
+TEST(Calibrate, OnePointSeenFromAllSidesTellsTheToolAndSaysThatItHardlyTellsHowTheBaseIsTurned) {
+  for (const Vector3& turn : {Vector3(0.1, -0.2, 2.8), Vector3(-2.2, 0.4, 0.6), Vector3(0.5, 1.9, -1.2)}) {
+    for (const std::vector<std::string>& specs : {std::vector<std::string>{}, {"base", "tool", "geometry"}}) {
+      const auto cell = test::cell_of_one_point("null", "null", "{error_sources: []}");
+      const MeasurementBatch batch =
+          test::one_point(*cell, 1e-3 * Vector3(4, -3, 6), make_pose(rotation_exp(turn), {1.2, -0.5, 0.3}), 30, 3);
+      const Result<CalibrationResult> result = calibrate(cell, specs, batch, {});
+      ASSERT_TRUE(result) << result.error().message;
+      EXPECT_LT(to_mm(result->rms), 0.036) << "0.02 mm of noise an axis";
+      PoseContext anywhere;
+      anywhere.q = JointVector::Zero(6);
+      anywhere.tool = "tip";
+      const Vector3 p_FT = result->model.state(anywhere).X_FT.translation();
+      EXPECT_LT((p_FT - 1e-3 * Vector3(34, -3, 156)).norm(), specs.empty() ? 1e-4 : 2e-3);
+      ASSERT_FALSE(result->unidentifiable.empty());
+      EXPECT_EQ(result->unidentifiable.front().parameters, (std::vector<std::string>{"gamma0", "beta0", "alpha0"}));
+    }
   }
 }
 

@@ -113,6 +113,52 @@ TEST(ModelNotes, WhatIsLeftIsHeldAgainstTheStatedSigma) {
   EXPECT_EQ(left(31).front().severity, Note::Severity::kStop);
 }
 
+TEST(ModelNotes, WhatIsLeftOfDistancesAndTouchesIsHeldAgainstTheStatedSigma) {
+  const auto left = [](double times) {
+    CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
+    parts.training.gauges = GaugeFigures{.rows = 60};
+    parts.discrepancy = parts.training.gauges->compensated = times * parts.physics.cell->tracker.sigma;
+    std::vector<Note> notes = notes_of(test::demand(CompensatedModel::make(parts)));
+    std::erase_if(notes, [](const Note& note) { return note.code != "left_over_sigma"; });
+    return notes;
+  };
+  EXPECT_TRUE(left(2.5).empty());
+  ASSERT_EQ(left(3.1).size(), 1U);
+  ASSERT_EQ(left(500).size(), 1U);
+  EXPECT_EQ(left(500).front().severity, Note::Severity::kStop);
+}
+
+TEST(ModelNotes, RowsThatFitNothingAreNamedAndManyOfThemWaitForAPerson) {
+  CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
+  parts.provenance.training_poses = 42;
+  parts.suspects = {{"p9", 9, 0.03, 1000}, {"p3", 3, 0.02, 700}};
+  const auto note = [&] {
+    std::vector<Note> notes = notes_of(test::demand(CompensatedModel::make(parts)));
+    std::erase_if(notes, [](const Note& one) { return one.code != "rows_do_not_fit"; });
+    return notes.empty() ? Note{} : notes.front();
+  };
+  EXPECT_EQ(note().severity, Note::Severity::kWarning);
+  EXPECT_EQ(note().text,
+            "2 of the measured rows do not fit the others, by up to 30 mm, and hardly count: rows 3, 9; measure them "
+            "again");
+  for (int row = 10; row < 20; ++row) parts.suspects.push_back({"more", row, 0.01, 300});
+  EXPECT_EQ(note().severity, Note::Severity::kStop);
+  parts.suspects.clear();
+  EXPECT_TRUE(note().code.empty());
+}
+
+TEST(ModelNotes, ABaseWhoseTurnThePosesDoNotTellWaitsForAPerson) {
+  CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
+  parts.unidentifiable.push_back({0, {"gamma0", "beta0", "alpha0"}, "they hardly tell how the base is turned"});
+  EXPECT_FALSE(stop_of(test::demand(CompensatedModel::make(parts)))) << "the cell says it";
+  auto anywhere = std::make_shared<Cell>(*parts.physics.cell);
+  anywhere->X_WB.reset();
+  parts.physics.cell = anywhere;
+  const auto stop = stop_of(test::demand(CompensatedModel::make(parts)));
+  ASSERT_TRUE(stop);
+  EXPECT_EQ(stop->code, "base_turn_untold");
+}
+
 TEST(ModelNotes, ASourceThatActsIsNot) {
   const std::vector<std::string> all = {"base",
                                         "geometry",

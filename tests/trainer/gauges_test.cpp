@@ -5,7 +5,9 @@
 #include <cmath>
 #include <optional>
 
+#include "server/base/units.h"
 #include "server/compensate/model_file.h"
+#include "server/compensate/model_notes.h"
 #include "server/compensate/world.h"
 #include "server/diagnose/diagnose.h"
 #include "server/health/health_check.h"
@@ -33,6 +35,25 @@ TrainOptions without_bias() {
   TrainOptions options;
   options.bias = "none";
   return options;
+}
+
+TEST(TrainedFromTouches, APlaneThatIsToldAskewWaitsForAPerson) {
+  const auto stop = [](double askew_deg) {
+    const double askew = from_deg(askew_deg);
+    const GaugedArm arm =
+        test::gauged_arm(23, {},
+                         fmt::format("{{table: {{xyz_mm: [1200, 0, 300], plane_normal: [{:.9f}, 0, {:.9f}]}}}}",
+                                     std::sin(askew), std::cos(askew)));
+    std::vector<test::GaugeRow> rows = test::position_rows(arm, 160, 23);
+    for (std::size_t i = 0; i < rows.size(); i += 2) {
+      rows[i].column = "touch_mm";
+      rows[i].anchor = "table";
+      rows[i].value_mm = rows[i].p_mm.z() - 300;
+    }
+    return stop_of(demand(train(arm.cell, checked(arm, rows, 23), without_bias())));
+  };
+  EXPECT_FALSE(stop(0)) << stop(0)->text;
+  EXPECT_TRUE(stop(2));
 }
 
 class TrainedFromWires : public testing::Test {

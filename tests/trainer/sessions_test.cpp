@@ -9,6 +9,7 @@
 #include "server/compensate/model_notes.h"
 #include "server/compensate/session_changes.h"
 #include "server/compensate/world.h"
+#include "server/robot/rigid_fit.h"
 #include "server/trainer/pipeline/lasting_sources.h"
 #include "server/trainer/pipeline/train.h"
 #include "tests/support/demand.h"
@@ -170,6 +171,42 @@ TEST(Sessions, AnInstrumentThatMeasuresTooLongInOneOfThemSpoilsNothing) {
   }));
   const CompensatedModel again = test::demand(deserialize(serialize(model), "again"));
   EXPECT_EQ(again.parts().sessions, sessions);
+}
+
+/// m, rms of what the model misses on another day of that robot whose instrument measures too long by `ppm`, with the
+/// best shift and turn taken off: nobody knows where the tracker stands.
+double missed_on_a_day(const CompensatedModel& model, const VirtualRobot& robot, double ppm) {
+  const MeasurementBatch fresh = measured_on(robot, {.poses = 200, .seed = 999});
+  const auto n = static_cast<Eigen::Index>(fresh.measurements.size());
+  Eigen::Matrix3Xd real(3, n), predicted(3, n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Measurement& m = fresh.measurements[static_cast<std::size_t>(i)];
+    real.col(i) = (1 + 1e-6 * ppm) * m.p_W;
+    predicted.col(i) = model.predict(m.context.q, "spindle", "spindle").X_BT_predicted.translation();
+  }
+  const Pose X_WB = test::demand(fit_transform(real, predicted));
+  return std::sqrt((real - X_WB * predicted).squaredNorm() / static_cast<double>(n));
+}
+
+TEST(Sessions, WhereTheBaseIsUnknownTheModelHasTheLengthsOfTheNewestSession) {
+  const auto cell = test::cell_7_unlocated();
+  const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
+  std::vector<CheckedBatch> batches;
+  for (const double ppm : {0.0, 85.0}) {
+    MeasurementBatch batch = measured_on(
+        robot, {.poses = ppm == 0 ? 120 : 80, .seed = 60 + static_cast<std::uint64_t>(ppm), .set_up_anew = true});
+    for (Measurement& m : batch.measurements) m.p_W *= 1 + 1e-6 * ppm;
+    batches.push_back(checked(std::move(batch), fmt::format("day-{}", batches.size() + 1), *cell));
+  }
+  const CompensatedModel model = test::demand(train(cell, joined(batches), kPhysics));
+  EXPECT_LT(to_mm(missed_on_a_day(model, robot, 85)), 0.06);
+  EXPECT_GT(to_mm(missed_on_a_day(model, robot, 0)), 0.1) << "the first day's lengths are others";
+  const auto& sessions = model.parts().sessions;
+  EXPECT_EQ(sessions.back().scale, 0);
+  EXPECT_NEAR(1e6 * sessions.front().scale, 85, 6);
+  for (const Note& note : notes_of(model))
+    EXPECT_TRUE(note.code != "session_scale" || note.text.find("ppm shorter than session day-2") != std::string::npos)
+        << note.text;
 }
 
 TEST(Sessions, HaveTheSameScaleWhereTheDataAskForNoOther) {

@@ -71,6 +71,22 @@ TEST(Train, TheModelRemembersThePosesThatDidNotFit) {
   EXPECT_GE(stored.parts().cost_record.size(), 2u);
 }
 
+TEST(Train, WhereTwoRowsInFiveAreBadTheOthersAreLearnedAsIfTheyHadBeenAlone) {
+  const auto cell = test::cell_7();
+  MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 60, 47);
+  MeasurementBatch good = batch;
+  std::erase_if(good.measurements, [&](const Measurement& m) { return m.row % 5 < 2; });
+  for (Measurement& m : batch.measurements) {
+    const double k = m.row;
+    if (m.row % 5 < 2) m.p_W += 0.03 * Vector3(std::sin(7 * k), std::cos(5 * k), std::sin(3 * k));
+  }
+  ASSERT_EQ(good.measurements.size(), 36u);
+  const CompensatedModel model = test::demand(train(cell, batch, quick("M3", "none")));
+  EXPECT_EQ(model.parts().physics.values, test::demand(train(cell, good, quick("M3", "none"))).parts().physics.values);
+  EXPECT_EQ(model.parts().training.poses, 36);
+  EXPECT_EQ(model.parts().suspects.size(), 24u);
+}
+
 TEST(Train, ABadPoseIsNotLearned) {
   const auto cell = test::cell_7();
   const VirtualRobot robot = test::chapter_5_robot(cell);

@@ -90,6 +90,12 @@ std::string evaluation_table(const Evaluation& evaluation) {
          doubt_line(evaluation);
 }
 
+std::string stated_coverage_line(double share) {
+  constexpr double kFar = 0.5;  // a model that leaves as much again as the instrument has 0.83
+  if (share >= kFar) return "";
+  return fmt::format("  {:.1f} % are inside the 95 % interval of the stated sigma alone\n", 100 * share);
+}
+
 std::string residuals_csv(const MeasurementBatch& batch, const CompensatedModel::LevelErrors& errors) {
   constexpr double kSuspect = 5.5;  // norm of 3 axes that 1 in 10^6 good poses exceeds
   std::string text =

@@ -44,6 +44,21 @@ std::vector<std::vector<Index>> halved(const MatrixXd& table, Index most) {
   return parts;
 }
 
+std::vector<std::vector<Index>> halved(const MatrixXd& table, const std::vector<PoseGroup>& poses, Index most) {
+  std::vector<Index> first;
+  for (const PoseGroup& pose : poses) first.push_back(pose.front());
+  std::vector<std::vector<Index>> parts;
+  for (const std::vector<Index>& part : halved(MatrixXd(table(first, Eigen::all)), most)) {
+    std::vector<Index>& rows = parts.emplace_back();
+    for (const Index p : part) {
+      const PoseGroup& pose = poses[static_cast<std::size_t>(p)];
+      rows.insert(rows.end(), pose.begin(), pose.end());
+    }
+    std::sort(rows.begin(), rows.end());
+  }
+  return parts;
+}
+
 MatrixXd joints_as_seen_by(const Kernel& kernel, const Eigen::VectorXd& parameters, const MatrixXd& q) {
   MatrixXd features(q.rows(), kernel.feature_count(q.cols()));
   if (features.cols() < q.cols() || features.cols() > q.cols() + 1) return q;

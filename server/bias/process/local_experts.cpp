@@ -27,9 +27,12 @@ VarianceForm form_of(VarianceForm wanted, std::size_t experts) {
   return wanted == VarianceForm::kLearned ? VarianceForm::kCompressed : wanted;
 }
 
+/// What stands at one joint vector belongs to one expert, so that it is left out together.
 std::vector<std::vector<Index>> neighbourhoods(const Kernel& kernel, const VectorXd& parameters, const MatrixXd& q) {
   if (q.rows() <= kMostExact) return halved(q, q.rows());
-  return halved(joints_as_seen_by(kernel, parameters, q), kMostOfAnExpert);
+  const std::vector<PoseGroup> poses = pose_groups(q);
+  return halved(joints_as_seen_by(kernel, parameters, q), poses,
+                std::max<Index>(1, kMostOfAnExpert * std::ssize(poses) / q.rows()));
 }
 
 }  // namespace

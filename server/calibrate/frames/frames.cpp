@@ -6,6 +6,8 @@
 
 #include "server/base/units.h"
 #include "server/calibrate/frames/localisation.h"
+#include "server/measurement/gauges.h"
+#include "server/robot/cube_turns.h"
 #include "server/robot/rigid_fit.h"
 
 namespace trammel {
@@ -13,6 +15,8 @@ namespace trammel {
 namespace {
 
 constexpr double kClearlyBetter = 0.5;  // of the misfit
+constexpr double kOnePlace = 50e-3;     // m, spread of positions: an arm that is off by 3 mm is a turn of 3 deg there
+constexpr double kTurnUntold = 0.2;     // of the spread of the nominal points: a turn that follows what does not fit
 
 }  // namespace
 
@@ -160,6 +164,58 @@ Vector6 motion_values(const Pose& X) {
   return values;
 }
 
+namespace {
+
+Eigen::Matrix3Xd beside_centroid(const Eigen::Matrix3Xd& points) { return points.colwise() - points.rowwise().mean(); }
+
+Eigen::Matrix3Xd measured_points(const MeasurementBatch& batch) {
+  const MeasurementBatch placed = positions_of(batch);
+  Eigen::Matrix3Xd p_W(3, static_cast<Eigen::Index>(placed.measurements.size()));
+  for (Eigen::Index i = 0; i < p_W.cols(); ++i) p_W.col(i) = placed.measurements[static_cast<std::size_t>(i)].p_W;
+  return p_W;
+}
+
+/// m, rms distance of the points from their centroid.
+double spread_of(const Eigen::Matrix3Xd& points) {
+  return beside_centroid(points).norm() / std::sqrt(static_cast<double>(points.cols()));
+}
+
+bool are_at_one_place(const Eigen::Matrix3Xd& points) { return points.cols() > 0 && spread_of(points) < kOnePlace; }
+
+/// The motion that takes `nominal` onto `measured`; a shift where what does not fit is as large as the points' spread.
+Result<Pose> motion_between(const Eigen::Matrix3Xd& measured, const Eigen::Matrix3Xd& nominal) {
+  Result<Pose> motion = fit_transform(measured, nominal);
+  if (!motion || (measured - *motion * nominal).norm() < kTurnUntold * beside_centroid(nominal).norm()) return motion;
+  return make_pose(Matrix3::Identity(), measured.rowwise().mean() - nominal.rowwise().mean());
+}
+
+}  // namespace
+
+std::vector<Pose> likely_bases(const PhysicalModel& model, const MeasurementBatch& batch) {
+  const Eigen::Matrix3Xd p_W = measured_points(batch);
+  if (model.cell->X_WB || !are_at_one_place(p_W)) return {model.X_WB};
+  std::vector<Pose> bases;
+  for (const Matrix3& turn : cube_turns()) bases.push_back(turned_about(p_W.rowwise().mean(), turn, model.X_WB));
+  return bases;
+}
+
+std::string untold_turn(const Cell& cell, const MeasurementBatch& batch) {
+  const Eigen::Matrix3Xd p_W = measured_points(batch);
+  if (cell.X_WB || !are_at_one_place(p_W)) return "";
+  return fmt::format(
+      "the positions lie within {:.2f} mm rms of one place, and hardly tell how the base is turned: an error of the "
+      "arm "
+      "of 0.1 mm turns it by {:.2g} deg; give the base in the cell file, or measure at other places, too",
+      to_mm(spread_of(p_W)), to_deg(1e-4 / std::max(spread_of(p_W), 1e-4)));
+}
+
+std::vector<std::string> turn_of_base() {
+  std::vector<std::string> names;
+  for (const auto& figure : cause_correcting(causes::Part::kBase).figures)
+    if (std::string_view(figure.unit) == "rad") names.emplace_back(figure.name);
+  return names;
+}
+
 void localise_base(PhysicalModel& model, const MeasurementBatch& batch) {
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : model.sources) {
@@ -179,7 +235,7 @@ void localise_base(PhysicalModel& model, const MeasurementBatch& batch) {
     measured.col(i) = model.X_WB.inverse() * m.p_W;
     nominal.col(i) = model.X_WB.inverse() * model.nominal_pose_W(m.context).translation();
   }
-  const Result<Pose> X_BB = fit_transform(measured, nominal);
+  const Result<Pose> X_BB = motion_between(measured, nominal);
   if (!X_BB) return;  // too few points to localise: the nominal base is the start
   model.values.segment<6>(first) = motion_values(*X_BB);
 }

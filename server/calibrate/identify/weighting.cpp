@@ -148,18 +148,34 @@ bool are_settled(const Weights& now, const Weights& before, const Tracker& track
          settled(tracker.sigma_rotation, now.discrepancy_rotation, before.discrepancy_rotation);
 }
 
+Eigen::VectorXd farness_of(const MeasurementBatch& batch, const Residuals& r, const Weights& weights) {
+  Eigen::VectorXd farness(static_cast<Eigen::Index>(batch.measurements.size()));
+  for (Eigen::Index i = 0; i < r.position.cols(); ++i)
+    farness(r.positions[static_cast<std::size_t>(i)]) = sigmas_of(r, i, weights) / kSuspect;
+  for (Eigen::Index i = 0; i < r.gauge.size(); ++i)
+    farness(r.gauges[static_cast<std::size_t>(i)]) = sigmas_of_gauge(r, i, weights) / kSuspectGauge;
+  return farness;
+}
+
+std::vector<SuspectPose> off_by(const MeasurementBatch& batch, const Residuals& r, const Weights& weights) {
+  std::vector<SuspectPose> all;
+  const auto add = [&](Eigen::Index measurement, double distance, double sigmas) {
+    const Measurement& m = batch.measurements[static_cast<std::size_t>(measurement)];
+    all.push_back({m.pose_id, m.row, distance, sigmas});
+  };
+  for (Eigen::Index i = 0; i < r.position.cols(); ++i)
+    add(r.positions[static_cast<std::size_t>(i)], r.position.col(i).norm(), sigmas_of(r, i, weights));
+  for (Eigen::Index i = 0; i < r.gauge.size(); ++i)
+    add(r.gauges[static_cast<std::size_t>(i)], std::abs(r.gauge(i)), sigmas_of_gauge(r, i, weights));
+  return all;
+}
+
 std::vector<SuspectPose> suspects_of(const MeasurementBatch& batch, const Residuals& r, const Weights& weights) {
+  const std::vector<SuspectPose> all = off_by(batch, r, weights);
+  const auto positions = static_cast<std::size_t>(r.position.cols());
   std::vector<SuspectPose> suspects;
-  for (Eigen::Index i = 0; i < r.position.cols(); ++i) {
-    const double sigmas = sigmas_of(r, i, weights);
-    const Measurement& m = batch.measurements[static_cast<std::size_t>(r.positions[static_cast<std::size_t>(i)])];
-    if (sigmas > kSuspect) suspects.push_back({m.pose_id, m.row, r.position.col(i).norm(), sigmas});
-  }
-  for (Eigen::Index i = 0; i < r.gauge.size(); ++i) {
-    const double sigmas = sigmas_of_gauge(r, i, weights);
-    const Measurement& m = batch.measurements[static_cast<std::size_t>(r.gauges[static_cast<std::size_t>(i)])];
-    if (sigmas > kSuspectGauge) suspects.push_back({m.pose_id, m.row, std::abs(r.gauge(i)), sigmas});
-  }
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (all[i].sigmas > (i < positions ? kSuspect : kSuspectGauge)) suspects.push_back(all[i]);
   std::sort(suspects.begin(), suspects.end(), [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });
   return suspects;
 }

@@ -55,6 +55,11 @@ struct Freedom {
 /// Whether measurements of `tracker` have nearly the same sigmas under both.
 [[nodiscard]] bool are_settled(const Weights& now, const Weights& before, const Tracker& tracker);
 
+/// How far each measurement is off: 1 as far as 1 in 10^6 good ones.
+[[nodiscard]] Eigen::VectorXd farness_of(const MeasurementBatch& batch, const Residuals& r, const Weights& weights);
+/// How far each measurement is off, those with a position first.
+[[nodiscard]] std::vector<SuspectPose> off_by(const MeasurementBatch& batch, const Residuals& r,
+                                              const Weights& weights);
 /// Poses that lie farther off than 1 in 10^6 good ones would, farthest first.
 [[nodiscard]] std::vector<SuspectPose> suspects_of(const MeasurementBatch& batch, const Residuals& r,
                                                    const Weights& weights);

@@ -8,8 +8,8 @@
 /// Set-ups of the instrument. In a session s the tracker sees (1 + k(s)) p = X_WS(s)^-1 X_WB f(q) + noise: the arm is
 /// one, and X_WS(s), where the instrument stood, belongs to the session. So does the scale k(s) where the data ask for
 /// it: an instrument that measures all lengths too long, or an arm that was colder as a whole. W is the world of the
-/// newest session, and its lengths are those of W (where the cell does not say where the base stands: those of the
-/// session with the most poses, by which it is found). A rigid motion leaves isotropic noise as it is, and so does a
+/// newest session, and its lengths are those of W (where the cell does not say where the base stands, too: the session
+/// with the most poses only finds it). A rigid motion leaves isotropic noise as it is, and so does a
 /// scale of parts in a million; so measurements may be moved into W as if all were of one set-up.
 namespace trammel {
 

@@ -6,6 +6,7 @@
 
 #include "server/base/units.h"
 #include "server/robot/arm_state.h"
+#include "server/robot/cube_turns.h"
 #include "server/robot/rigid_fit.h"
 
 namespace trammel::reading {
@@ -342,6 +343,22 @@ ArmFit fitted(const NumberTable& table, const Cell& cell, const ArmFit& start, T
   ArmFit fit = fitting.from(start, kMostSteps);
   fitting.add_uncertainty(fit);
   return fit;
+}
+
+ArmFit fitted_from_all_sides(const NumberTable& table, const Cell& cell, const ArmFit& start) {
+  const Vector3 place = table.p_W.rowwise().mean();
+  ArmFit best = fitted(table, cell, start);
+  std::vector<Pose> bases = {start.X_WB};
+  if (cell.X_WB) bases.push_back(*cell.X_WB);
+  for (const Pose& X_WB : bases) {
+    for (const Matrix3& turn : cube_turns()) {
+      ArmFit from = start;
+      from.X_WB = turned_about(place, turn, X_WB);
+      ArmFit fit = fitted(table, cell, from);
+      if (fit.quality < best.quality) best = std::move(fit);
+    }
+  }
+  return best;
 }
 
 std::vector<double> distances(const NumberTable& table, const Cell& cell, const ArmFit& fit) {

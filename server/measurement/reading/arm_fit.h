@@ -36,6 +36,9 @@ enum class ToolPoints {
 [[nodiscard]] ArmFit fitted(const NumberTable& table, const Cell& cell, const ArmFit& start,
                             ToolPoints points = ToolPoints::kAsDrawn);
 
+/// The same of positions at one place, which do not tell how the base is turned: from several turns, the best fit.
+[[nodiscard]] ArmFit fitted_from_all_sides(const NumberTable& table, const Cell& cell, const ArmFit& start);
+
 /// m, of every row: how far the position is from where the joints lead.
 [[nodiscard]] std::vector<double> distances(const NumberTable& table, const Cell& cell, const ArmFit& fit);
 /// X_WF of a row.

@@ -1,6 +1,7 @@
 #include "server/measurement/reading/number_table.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <string>
 
@@ -50,6 +51,11 @@ NumberTable thinned(const NumberTable& table, std::size_t most) {
   }
   std::sort(rows.begin(), rows.end());
   return matched(table, rows, rows);
+}
+
+double spread(const NumberTable& table) {
+  const Eigen::Matrix3Xd beside = table.p_W.colwise() - table.p_W.rowwise().mean();
+  return beside.norm() / std::sqrt(static_cast<double>(table.size()));
 }
 
 double median(std::vector<double> values) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/calibrate/agreement.h"
 #include "server/calibrate/batch_check.h"
 #include "server/calibrate/calibrate_with_maps.h"
 #include "server/calibrate/frames/frames.h"
@@ -162,19 +163,42 @@ CompensatedModel::Parts calibrated_parts(CalibrationResult calibration, const Le
   return parts;
 }
 
+/// The physics by all rows of `batch`, and what changed between its sessions.
+Result<IdentifiedSessions> identified_on(const MeasurementBatch& batch, const std::shared_ptr<const Cell>& cell,
+                                         const std::vector<std::string>& sources, const TrainOptions& options,
+                                         const Report& report) {
+  const Identify identify = [&](const std::vector<std::string>& names) {
+    return options.fleet ? calibrate_among_twins(cell, names, batch, *options.fleet)
+                         : calibrate_with_maps(cell, names, batch, {.held = {}, .weigh_links = true});
+  };
+  return identify_sessions(identify, sources, batch, [&](double share) -> Status {
+    if (!report("asking what changed between the sessions", 0.3 * share)) return given_up();
+    return {};
+  });
+}
+
+/// The same without rows that fit none of the arms on which the others agree. They leave `batch`, and are suspects.
+Result<IdentifiedSessions> identified_by_most(Result<IdentifiedSessions> plain, MeasurementBatch& batch,
+                                              const std::shared_ptr<const Cell>& cell,
+                                              const std::vector<std::string>& sources, const TrainOptions& options,
+                                              const Report& report) {
+  const auto calibration = plain.map([](const IdentifiedSessions& all) { return all.calibration; });
+  std::optional<Agreement> agreement = agreement_of(cell, sources, batch, calibration);
+  if (!agreement) return plain;
+  Result<IdentifiedSessions> found = identified_on(agreement->agreeing, cell, sources, options, report);
+  if (!found) return plain;
+  add_suspects(agreement->others, found->calibration);
+  batch = std::move(agreement->agreeing);
+  return found;
+}
+
 /// The physics, identified anew; `split` comes into its world.
 Result<IdentifiedSessions> identified(const std::shared_ptr<const Cell>& cell, BatchSplit& split,
                                       const TrainOptions& options, const Report& report) {
   const Result<std::vector<std::string>> sources = sources_of(*cell, options);
   if (!sources) return tl::make_unexpected(sources.error());
-  const Identify identify = [&](const std::vector<std::string>& names) {
-    return options.fleet ? calibrate_among_twins(cell, names, split.train, *options.fleet)
-                         : calibrate_with_maps(cell, names, split.train, {.held = {}, .weigh_links = true});
-  };
-  auto found = identify_sessions(identify, *sources, split.train, [&](double share) -> Status {
-    if (!report("asking what changed between the sessions", 0.3 * share)) return given_up();
-    return {};
-  });
+  auto found = identified_by_most(identified_on(split.train, cell, *sources, options, report), split.train, cell,
+                                  *sources, options, report);
   if (!found) return found;
   split.train = aligned(std::move(split.train), found->calibration.sessions, cell->tracker);
   split.validation = aligned(std::move(split.validation), found->calibration.sessions, cell->tracker);

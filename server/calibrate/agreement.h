@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "server/calibrate/calibration.h"
+
+/// Which rows of a batch agree on one arm, where many are bad.
+namespace trammel {
+
+struct Agreement {
+  MeasurementBatch agreeing;  ///< rows that one arm leads to
+  MeasurementBatch others;    ///< rows that this arm does not lead to, at most two in five
+};
+
+/// The rows of `batch` on which `sources` should be identified alone; empty where that is all of them. `plain` was
+/// identified on all: where it leaves no more than 3 times the stated sigma, nothing is asked. Else least trimmed
+/// squares (Rousseeuw 1984) by concentration steps (Rousseeuw and Van Driessen 1999), from all rows and from base and
+/// tool alone; then rows come back that fit as well as those that were kept. There are bad rows only if the others are
+/// left with a quarter of what was left: a model that lacks something leaves nearly as much at any rows. A batch of
+/// several sessions is not asked: what differs between them is a change.
+[[nodiscard]] std::optional<Agreement> agreement_of(const std::shared_ptr<const Cell>& cell,
+                                                    const std::vector<std::string>& sources,
+                                                    const MeasurementBatch& batch,
+                                                    const Result<CalibrationResult>& plain);
+
+/// Names `others` among the suspects of `found`, which was identified on the rows that agree.
+void add_suspects(const MeasurementBatch& others, CalibrationResult& found);
+
+}  // namespace trammel

@@ -1,0 +1,133 @@
+#include "server/calibrate/agreement.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <set>
+
+#include "server/base/units.h"
+#include "server/calibrate/calibrate.h"
+#include "server/plan/plan.h"
+#include "server/simulate/simulate.h"
+#include "tests/support/demand.h"
+#include "tests/support/virtual_robot.h"
+
+namespace trammel {
+namespace {
+
+const std::vector<std::string> kM3 = {"base", "geometry", "compliance"};
+
+std::optional<Agreement> agreement(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
+                                   const MeasurementBatch& batch) {
+  return agreement_of(cell, sources, batch, calibrate(cell, sources, batch, {}));
+}
+
+MeasurementBatch positions(int poses, std::uint64_t seed) {
+  MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), poses, seed, false);
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i) batch.measurements[i].row = static_cast<int>(i) + 2;
+  return batch;
+}
+
+/// Spoils so many rows, drawn, by about `off` (m); which.
+std::set<int> spoil(MeasurementBatch& batch, double share, double off, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<std::size_t> order(batch.measurements.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::shuffle(order.begin(), order.end(), random);
+  std::set<int> rows;
+  for (std::size_t k = 0; static_cast<double>(k) + 1 <= share * static_cast<double>(order.size()); ++k) {
+    Measurement& m = batch.measurements[order[k]];
+    Vector3 direction(normal(random), normal(random), normal(random));
+    m.p_W += off * direction.normalized();
+    rows.insert(m.row);
+  }
+  return rows;
+}
+
+std::set<int> rows_of(const MeasurementBatch& batch) {
+  std::set<int> rows;
+  for (const Measurement& m : batch.measurements) rows.insert(m.row);
+  return rows;
+}
+
+TEST(Agreement, UpToTwoRowsInFiveMayBeBadAndEachOfThemIsFound) {
+  const auto cell = test::cell_7();
+  for (const double share : {0.2, 0.3, 0.4}) {
+    for (const double off : {3e-3, 30e-3, 0.3}) {
+      MeasurementBatch batch = positions(60, 11);
+      const std::set<int> bad = spoil(batch, share, off, 5);
+      const auto found = agreement(cell, kM3, batch);
+      ASSERT_TRUE(found) << share << ", " << off;
+      EXPECT_EQ(rows_of(found->others), bad) << share << ", " << off;
+    }
+  }
+}
+
+TEST(Agreement, TwoReflectorsThatWereExchangedInAQuarterOfThePosesAreFound) {
+  auto cell = std::make_shared<Cell>(*test::cell_7());
+  const Pose spindle = *cell->tools.at("spindle");
+  cell->tools = {{"a", spindle}, {"b", spindle}, {"c", spindle}};
+  cell->tools["b"]->translation() += Vector3(0.1, -0.05, 0.12);
+  cell->tools["c"]->translation() += Vector3(-0.08, 0.1, 0.05);
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const Eigen::MatrixXd q = test::demand(plan_poses(*cell, {32, 3}));
+  MeasurementBatch batch;
+  for (const char* tool : {"a", "b", "c"}) {
+    SimulateOptions options;
+    options.seed = 7;
+    options.orientation = false;
+    options.tool = tool;
+    options.payload = "spindle";
+    for (Measurement& m : test::demand(simulate(robot, q, options)).measurements) {
+      m.row = static_cast<int>(batch.measurements.size()) + 2;
+      batch.measurements.push_back(std::move(m));
+    }
+  }
+  for (Measurement& m : batch.measurements) m.p_W += 20e-6 * Vector3(std::sin(m.row), std::cos(m.row), 0);
+  std::set<int> exchanged;
+  for (std::size_t i = 0; i < 32; i += 4) {
+    std::swap(batch.measurements[32 + i].p_W, batch.measurements[64 + i].p_W);
+    for (const std::size_t row : {32 + i, 64 + i}) exchanged.insert(batch.measurements[row].row);
+  }
+  const auto found = agreement(cell, kM3, batch);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(rows_of(found->others), exchanged);
+}
+
+TEST(Agreement, AGoodBatchIsNotAsked) { EXPECT_FALSE(agreement(test::cell_7(), kM3, positions(60, 21))); }
+
+TEST(Agreement, AModelThatLacksSomethingHasNoBadRows) {
+  const auto cell = test::cell_7();
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    for (const std::vector<std::string>& sources :
+         {std::vector<std::string>{}, {"base"}, {"base", "geometry"}, {"geometry"}})
+      EXPECT_FALSE(agreement(cell, sources, positions(80, seed))) << sources.size() << ", seed " << seed;
+  }
+}
+
+TEST(Agreement, JointsInWholeDegreesAreNoBadRows) {
+  MeasurementBatch batch = positions(80, 31);
+  for (Measurement& m : batch.measurements)
+    for (double& q : m.context.q) q = from_deg(std::round(to_deg(q)));
+  EXPECT_FALSE(agreement(test::cell_7(), kM3, batch));
+}
+
+TEST(Agreement, WhatDoesNotAgreeIsNamedWithItsRowAndDistance) {
+  const auto cell = test::cell_7();
+  MeasurementBatch batch = positions(60, 41);
+  const std::set<int> bad = spoil(batch, 0.3, 30e-3, 6);
+  const auto found = agreement(cell, kM3, batch);
+  ASSERT_TRUE(found);
+  CalibrationResult good = test::demand(calibrate(cell, kM3, found->agreeing, {}));
+  EXPECT_LT(to_mm(good.rms), 0.05);
+  add_suspects(found->others, good);
+  ASSERT_EQ(good.suspects.size(), bad.size());
+  for (const SuspectPose& pose : good.suspects) {
+    EXPECT_TRUE(bad.contains(pose.row));
+    EXPECT_NEAR(to_mm(pose.distance), 30, 0.2);
+  }
+}
+
+}  // namespace
+}  // namespace trammel
