@@ -1,6 +1,7 @@
 #include "server/plan/approach.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "server/base/check.h"
@@ -15,24 +16,47 @@ constexpr double kBumpLength = from_mm(50);  // of a rail
 constexpr double kLeastBump = 0.2;           // of the bump: 1 deg takes up any play
 constexpr double kGrid = 1e-4;               // deg, mm: the four decimals of programs
 
+double longest_way(const Joint& joint) { return joint.type == JointType::kRevolute ? kBumpAngle : kBumpLength; }
+
+/// Where the joint starts to come to `q` from this side; nothing where it has too little way.
+std::optional<double> start_of(const Joint& joint, double q, int side) {
+  TRAMMEL_CHECK(side == 1 || side == -1);
+  const double start = std::clamp(q - side * longest_way(joint), joint.lower, joint.upper);
+  if (std::abs(start - q) < kLeastBump * longest_way(joint)) return std::nullopt;
+  return start;
+}
+
 }  // namespace
 
-std::optional<JointVector> bump_pose(const Chain& robot, const JointVector& q, int direction) {
-  TRAMMEL_CHECK(direction == 1 || direction == -1);
+Sides planned_sides(const Chain& robot, int number) {
+  Sides sides;
+  // Columns of a Hadamard matrix: joint j has the binary digits of j + 1, and the last digit turns all of them.
+  for (int j = 0; j < robot.size(); ++j)
+    sides.push_back(std::popcount(static_cast<unsigned>(number) & static_cast<unsigned>(2 * j + 3)) % 2 == 0 ? -1 : 1);
+  return sides;
+}
+
+Sides possible_sides(const Chain& robot, const JointVector& q, Sides wanted) {
+  for (int j = 0; j < robot.size(); ++j) {
+    int& side = wanted[static_cast<std::size_t>(j)];
+    if (!start_of(robot.joint(j), q(j), side)) side = -side;
+  }
+  return wanted;
+}
+
+std::optional<JointVector> bump_pose(const Chain& robot, const JointVector& q, const Sides& sides) {
   JointVector bump = q;
   for (int j = 0; j < robot.size(); ++j) {
-    const Joint& joint = robot.joint(j);
-    const double way = joint.type == JointType::kRevolute ? kBumpAngle : kBumpLength;
-    bump(j) = std::clamp(q(j) - direction * way, joint.lower, joint.upper);
-    if (std::abs(bump(j) - q(j)) < kLeastBump * way) return std::nullopt;
+    const auto start = start_of(robot.joint(j), q(j), sides[static_cast<std::size_t>(j)]);
+    if (!start) return std::nullopt;
+    bump(j) = *start;
   }
   return bump;
 }
 
 std::pair<double, double> approachable_range(const Joint& joint, double lower, double upper) {
-  const bool revolute = joint.type == JointType::kRevolute;
-  const double grid = revolute ? from_deg(kGrid) : from_mm(kGrid);
-  const double least = kLeastBump * (revolute ? kBumpAngle : kBumpLength) + grid;
+  const double grid = joint.type == JointType::kRevolute ? from_deg(kGrid) : from_mm(kGrid);
+  const double least = kLeastBump * longest_way(joint) + grid;
   const double from = std::max(lower + grid, joint.lower + least);
   const double to = std::min(upper - grid, joint.upper - least);
   return from < to ? std::pair(from, to) : std::pair(lower, upper);

@@ -7,29 +7,28 @@ namespace trammel {
 
 namespace {
 
-/// The sides to try: the recorded one where it is the same for all joints, else both.
-std::vector<int> sides_of(const PoseContext& context) {
-  const std::vector<int>& recorded = context.direction;
-  const bool one_side = !recorded.empty() && recorded.front() != 0 &&
-                        std::all_of(recorded.begin(), recorded.end(), [&](int d) { return d == recorded.front(); });
-  return one_side ? std::vector<int>{recorded.front()} : std::vector<int>{1, -1};
+/// The recorded sides where each joint has one, else those of the plan that the limits allow.
+Sides sides_of(const Chain& robot, const PoseContext& context, int number) {
+  const Sides& recorded = context.direction;
+  const bool known = !recorded.empty() && std::count(recorded.begin(), recorded.end(), 0) == 0;
+  return known ? recorded : possible_sides(robot, context.q, planned_sides(robot, number));
 }
 
-Result<PlannedPose> planned_pose(const Chain& robot, const CommandedPose& given, const std::string& where) {
+Result<PlannedPose> planned_pose(const Chain& robot, const CommandedPose& given, int number, const std::string& where) {
   PlannedPose pose{given.pose_id, given.context, {}};
+  pose.context.index = number;
   pose.context.q = on_program_grid(robot, given.context.q);
-  for (const int side : sides_of(given.context)) {
-    const auto bump = bump_pose(robot, pose.context.q, side);
-    if (!bump) continue;
-    pose.bump = on_program_grid(robot, *bump);
-    pose.context.direction.assign(static_cast<std::size_t>(robot.size()), side);
-    return pose;
+  pose.context.direction = sides_of(robot, pose.context, number);
+  const auto bump = bump_pose(robot, pose.context.q, pose.context.direction);
+  if (!bump) {
+    return refused("pose {} is too near to a joint limit to be approached", given.pose_id)
+        .in(where)
+        .at_row(given.row)
+        .of("pose_id")
+        .with_text(given.pose_id);
   }
-  return refused("pose {} is too near to a joint limit to be approached", given.pose_id)
-      .in(where)
-      .at_row(given.row)
-      .of("pose_id")
-      .with_text(given.pose_id);
+  pose.bump = on_program_grid(robot, *bump);
+  return pose;
 }
 
 }  // namespace
@@ -37,9 +36,9 @@ Result<PlannedPose> planned_pose(const Chain& robot, const CommandedPose& given,
 Result<Plan> plan_of(const Cell& cell, const JointList& list) {
   Plan plan;
   for (const CommandedPose& given : list.poses) {
-    Result<PlannedPose> pose = planned_pose(cell.robot, given, list.where);
+    const auto number = static_cast<int>(plan.poses.size());
+    Result<PlannedPose> pose = planned_pose(cell.robot, given, number, list.where);
     if (!pose) return tl::make_unexpected(pose.error());
-    pose->context.index = static_cast<int>(plan.poses.size());
     plan.poses.push_back(std::move(*pose));
   }
   plan.draw.drawn = plan.draw.kept = static_cast<int>(plan.poses.size());

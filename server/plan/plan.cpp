@@ -53,11 +53,11 @@ constexpr int kCandidatesForEachPose = 4;  // at least: of fewer a choice is har
 constexpr int kLargestFactor = 512;       // of poses: fewer than 1 in 1000 fits then
 constexpr int kLargestDesignFactor = 64;  // of candidates: they are more already, and each is linearised
 
-/// What the cell allows, asked for every tool that will be used and every side that a pose is approached from.
+/// What the cell allows, asked for every tool that will be used.
 class Filter {
  public:
-  static Result<Filter> of(const Cell& cell, const std::vector<std::string>& tools, std::vector<int> directions) {
-    Filter filter(cell, std::move(directions));
+  static Result<Filter> of(const Cell& cell, const std::vector<std::string>& tools) {
+    Filter filter(cell);
     for (const std::string& tool : tools) {
       filter.X_FT_.push_back(cell.tools.at(tool).value_or(Pose::Identity()));
       Result<Visibility> visibility = Visibility::of(cell, tool);
@@ -67,12 +67,12 @@ class Filter {
     return filter;
   }
 
-  /// Whether the candidate may be planned; counts it.
-  bool keeps(const JointVector& q, DrawCount& count) const {
+  /// Whether the candidate may be planned, approached in each of these ways; counts it.
+  bool keeps(const JointVector& q, const std::vector<Sides>& ways, DrawCount& count) const {
     ++count.drawn;
     std::vector<JointVector> visited = {q};
-    for (const int direction : directions_) {
-      const std::optional<JointVector> bump = bump_pose(cell_.robot, q, direction);
+    for (const Sides& sides : ways) {
+      const std::optional<JointVector> bump = bump_pose(cell_.robot, q, sides);
       if (!bump) return ++count.no_way, false;
       visited.push_back(*bump);
     }
@@ -84,7 +84,7 @@ class Filter {
   }
 
  private:
-  Filter(const Cell& cell, std::vector<int> directions) : cell_(cell), directions_(std::move(directions)) {}
+  explicit Filter(const Cell& cell) : cell_(cell) {}
 
   /// By the nominal robot.
   bool inside_workspace(const JointVector& q) const {
@@ -97,7 +97,6 @@ class Filter {
   }
 
   const Cell& cell_;
-  std::vector<int> directions_;
   std::vector<Pose> X_FT_;
   std::vector<Visibility> visibility_;
 };
@@ -108,10 +107,11 @@ struct Drawn {
 };
 
 /// `wanted` joint vectors that the filter keeps, from a Latin hypercube that doubles until it is large enough, up to
-/// `largest_factor` times as many as wanted. Refuses where even that one has fewer than `needed`.
-template <typename Prepare>
+/// `largest_factor` times as many as wanted. Refuses where even that one has fewer than `needed`. `ways_of` tells how
+/// the next one that is kept, with this number, would be approached.
+template <typename Prepare, typename WaysOf>
 Result<Drawn> draw(const Cell& cell, const Filter& filter, int wanted, int needed, int largest_factor,
-                   std::uint64_t seed, const Prepare& prepare) {
+                   std::uint64_t seed, const Prepare& prepare, const WaysOf& ways_of) {
   const Result<JointRanges> ranges = planning_ranges(cell);
   if (!ranges) return tl::make_unexpected(ranges.error());
   Drawn drawn;
@@ -126,7 +126,7 @@ Result<Drawn> draw(const Cell& cell, const Filter& filter, int wanted, int neede
         continue;
       }
       q = prepare(std::move(q));
-      if (filter.keeps(q, drawn.count)) drawn.q.push_back(std::move(q));
+      if (filter.keeps(q, ways_of(q, drawn.q.size()), drawn.count)) drawn.q.push_back(std::move(q));
     }
   }
   const DrawCount& count = drawn.count;
@@ -154,7 +154,14 @@ Status check_count(const PlanOptions& options) {
 struct Planning {
   std::shared_ptr<const Cell> cell;
   std::vector<std::string> tools, payloads;
-  std::vector<int> directions;  // each pose is approached in all of these
+  bool twice = false;  // each pose from above and from below
+
+  /// How the pose with this number is approached.
+  [[nodiscard]] std::vector<Sides> ways(const JointVector& q, std::size_t number) const {
+    const auto joints = static_cast<std::size_t>(q.size());
+    if (twice) return {Sides(joints, -1), Sides(joints, 1)};
+    return {possible_sides(cell->robot, q, planned_sides(cell->robot, static_cast<int>(number)))};
+  }
 };
 
 Result<std::vector<std::string>> resolved(const Cell& cell, const std::vector<std::string>& asked,
@@ -168,14 +175,14 @@ Result<std::vector<std::string>> resolved(const Cell& cell, const std::vector<st
   return names;
 }
 
-/// Each pose once for every side that it is approached from; tools and payloads in turn.
+/// Each pose once for every way that it is approached in; tools and payloads in turn.
 std::vector<PoseContext> contexts_of(const Planning& planning, const std::vector<JointVector>& q) {
   std::vector<PoseContext> contexts;
   for (std::size_t i = 0; i < q.size(); ++i) {
-    for (const int direction : planning.directions) {
+    for (Sides& sides : planning.ways(q[i], i)) {
       PoseContext context;
       context.q = q[i];
-      context.direction.assign(static_cast<std::size_t>(q[i].size()), direction);
+      context.direction = std::move(sides);
       context.tool = planning.tools[i % planning.tools.size()];
       context.payload = planning.payloads[i / planning.tools.size() % planning.payloads.size()];
       contexts.push_back(std::move(context));
@@ -184,25 +191,35 @@ std::vector<PoseContext> contexts_of(const Planning& planning, const std::vector
   return contexts;
 }
 
+/// Poses that were chosen come from the sides of their place in the plan, as far as the arm stays in the workspace on
+/// the way: the choice alone would leave some joint more often on one side.
+void come_in_turn(const Planning& planning, const Filter& filter, std::vector<PoseContext>& poses) {
+  if (planning.twice) return;
+  DrawCount count;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    std::vector<Sides> ways = planning.ways(poses[i].q, i);
+    if (filter.keeps(poses[i].q, ways, count)) poses[i].direction = std::move(ways.front());
+  }
+}
+
 std::vector<PlannedPose> planned(const Planning& planning, std::vector<PoseContext> contexts) {
-  const std::size_t sides = planning.directions.size();
-  std::vector<std::size_t> order(contexts.size() / sides);
+  const std::size_t ways = planning.twice ? 2 : 1;
+  std::vector<std::size_t> order(contexts.size() / ways);
   std::iota(order.begin(), order.end(), 0u);
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    const PoseContext& left = contexts[a * sides];
-    const PoseContext& right = contexts[b * sides];
+    const PoseContext& left = contexts[a * ways];
+    const PoseContext& right = contexts[b * ways];
     return std::tie(left.tool, left.payload) < std::tie(right.tool, right.payload);
   });
   std::vector<PlannedPose> poses;
   for (std::size_t i = 0; i < order.size(); ++i) {
-    for (std::size_t side = 0; side < sides; ++side) {
+    for (std::size_t way = 0; way < ways; ++way) {
       PlannedPose pose;
-      const int direction = planning.directions[side];
-      pose.id = fmt::format("{}{}", i + 1, sides == 1 ? "" : direction > 0 ? "+" : "-");
-      pose.context = std::move(contexts[order[i] * sides + side]);
+      pose.context = std::move(contexts[order[i] * ways + way]);
+      pose.id = fmt::format("{}{}", i + 1, ways == 1 ? "" : pose.context.direction.front() > 0 ? "+" : "-");
       pose.context.index = static_cast<int>(poses.size());
       const Chain& robot = planning.cell->robot;
-      pose.bump = on_program_grid(robot, bump_pose(robot, pose.context.q, direction).value());
+      pose.bump = on_program_grid(robot, bump_pose(robot, pose.context.q, pose.context.direction).value());
       poses.push_back(std::move(pose));
     }
   }
@@ -237,13 +254,13 @@ Plan::Separation separation_of(const CausePair& pair, const Separability& plan, 
 }
 
 /// Chooses among `candidates`, and compares with `latin_hypercube`.
-Result<Plan> designed(const Planning& planning, const PlanOptions& options, const Drawn& candidates,
-                      const Drawn& latin_hypercube) {
+Result<Plan> designed(const Planning& planning, const PlanOptions& options, const Filter& filter,
+                      const Drawn& candidates, const Drawn& latin_hypercube) {
   const Result<CausePair> pair = pair_of(planning, options);
   if (!pair) return tl::make_unexpected(pair.error());
-  const int sides = static_cast<int>(planning.directions.size());
+  const int ways = planning.twice ? 2 : 1;
   const std::vector<PoseContext> contexts = contexts_of(planning, candidates.q);
-  const DesignCandidates rows = design_candidates(pair->model, contexts, options.orientation, sides);
+  const DesignCandidates rows = design_candidates(pair->model, contexts, options.orientation, ways);
   const Eigen::Index P = rows.rows.cols();
   const Eigen::MatrixXd prior = Eigen::MatrixXd::Identity(P, P);
   const Result<Design> design = optimal_design(rows, prior, options.count, pair->rest);
@@ -251,27 +268,34 @@ Result<Plan> designed(const Planning& planning, const PlanOptions& options, cons
 
   std::vector<PoseContext> chosen;
   for (const std::size_t i : design->chosen) {
-    const auto first = contexts.begin() + static_cast<std::ptrdiff_t>(i) * sides;
-    chosen.insert(chosen.end(), first, first + sides);
+    const auto first = contexts.begin() + static_cast<std::ptrdiff_t>(i) * ways;
+    chosen.insert(chosen.end(), first, first + ways);
   }
-  const Eigen::MatrixXd evenly =
-      information_of(pair->model, contexts_of(planning, latin_hypercube.q), options.orientation);
+  come_in_turn(planning, filter, chosen);
+  const auto information = [&](const std::vector<PoseContext>& poses) {
+    return information_of(pair->model, poses, options.orientation);
+  };
+  const auto criterion = [&](const Eigen::MatrixXd& told) {
+    const Eigen::MatrixXd known = prior + told;
+    return log_det(known) - (pair->rest.empty() ? 0 : log_det(known(pair->rest, pair->rest)));
+  };
+  const Eigen::MatrixXd of_plan = information(chosen);
+  const Eigen::MatrixXd evenly = information(contexts_of(planning, latin_hypercube.q));
   Plan plan;
   plan.draw = candidates.count;
-  plan.criterion = design->criterion;
-  plan.criterion_of_latin_hypercube = log_det(prior + evenly);
+  plan.criterion = criterion(of_plan);
+  plan.criterion_of_latin_hypercube = criterion(evenly);
   if (options.criterion == PlanCriterion::kSeparation) {
-    plan.criterion_of_latin_hypercube -= log_det((prior + evenly)(pair->rest, pair->rest));
-    const auto told = [&](const Eigen::MatrixXd& information) { return separability(*pair, information); };
-    plan.separation = separation_of(*pair, told(information_of(pair->model, chosen, options.orientation)), told(evenly),
-                                    told(rows.rows.transpose() * rows.rows));
+    const auto told = [&](const Eigen::MatrixXd& known) { return separability(*pair, known); };
+    plan.separation = separation_of(*pair, told(of_plan), told(evenly), told(rows.rows.transpose() * rows.rows));
   }
   plan.poses = planned(planning, std::move(chosen));
   return plan;
 }
 
 /// Chooses among `candidates`, which also stand for the poses that the cell works at.
-Result<Plan> planned_check(const Planning& planning, const PlanOptions& options, const Drawn& candidates) {
+Result<Plan> planned_check(const Planning& planning, const PlanOptions& options, const Filter& filter,
+                           const Drawn& candidates) {
   const Result<CausePair> pair = pair_of(planning, options);
   if (!pair) return tl::make_unexpected(pair.error());
   const std::vector<PoseContext> contexts = contexts_of(planning, candidates.q);
@@ -282,14 +306,15 @@ Result<Plan> planned_check(const Planning& planning, const PlanOptions& options,
   test.sigma = planning.cell->tracker.sigma;
   test.sigma_rotation = planning.cell->tracker.sigma_rotation;
   test.orientation = options.orientation;
-  Result<CheckDesign> design =
-      check_design(effects, work.signals(effects, options.seed), contexts, options.count, test);
+  const std::vector<CauseSignal> signals = work.signals(effects, options.seed);
+  const Result<CheckDesign> design = check_design(effects, signals, contexts, options.count, test);
   if (!design) return tl::make_unexpected(design.error());
   std::vector<PoseContext> chosen;
   for (const std::size_t i : design->chosen) chosen.push_back(contexts[i]);
+  come_in_turn(planning, filter, chosen);
   Plan plan;
   plan.draw = candidates.count;
-  plan.smallest = std::move(design->smallest);
+  plan.smallest = smallest_effects(effects, signals, chosen, test);
   plan.poses = planned(planning, std::move(chosen));
   return plan;
 }
@@ -298,10 +323,11 @@ Result<Plan> planned_check(const Planning& planning, const PlanOptions& options,
 
 Result<Eigen::MatrixXd> plan_poses(const Cell& cell, const PlanOptions& options) {
   if (const Status counted = check_count(options); !counted) return tl::make_unexpected(counted.error());
-  const Result<Filter> filter = Filter::of(cell, {cell.tools.begin()->first}, {});
+  const Result<Filter> filter = Filter::of(cell, {cell.tools.begin()->first});
   if (!filter) return tl::make_unexpected(filter.error());
-  const Result<Drawn> drawn =
-      draw(cell, *filter, options.count, options.count, kLargestFactor, options.seed, [](JointVector q) { return q; });
+  const Result<Drawn> drawn = draw(
+      cell, *filter, options.count, options.count, kLargestFactor, options.seed, [](JointVector q) { return q; },
+      [](const JointVector&, std::size_t) { return std::vector<Sides>(); });
   if (!drawn) return tl::make_unexpected(drawn.error());
   Eigen::MatrixXd q(options.count, cell.robot.size());
   for (Eigen::Index i = 0; i < q.rows(); ++i) q.row(i) = drawn->q[static_cast<std::size_t>(i)].transpose();
@@ -309,12 +335,8 @@ Result<Eigen::MatrixXd> plan_poses(const Cell& cell, const PlanOptions& options)
 }
 
 Result<std::vector<bool>> plannable(const Cell& cell, const Eigen::MatrixXd& q) {
-  std::vector<Filter> either;
-  for (const int direction : {-1, 1}) {
-    Result<Filter> filter = Filter::of(cell, {cell.tools.begin()->first}, {direction});
-    if (!filter) return tl::make_unexpected(filter.error());
-    either.push_back(std::move(*filter));
-  }
+  const Result<Filter> filter = Filter::of(cell, {cell.tools.begin()->first});
+  if (!filter) return tl::make_unexpected(filter.error());
   const Result<JointRanges> ranges = planning_ranges(cell);
   if (!ranges) return tl::make_unexpected(ranges.error());
   DrawCount count;
@@ -326,8 +348,11 @@ Result<std::vector<bool>> plannable(const Cell& cell, const Eigen::MatrixXd& q) 
       const double at = one(static_cast<Eigen::Index>(j));
       inside = inside && at >= (*ranges)[j].first && at <= (*ranges)[j].second;
     }
-    may[static_cast<std::size_t>(i)] =
-        inside && std::any_of(either.begin(), either.end(), [&](const Filter& side) { return side.keeps(one, count); });
+    const auto comes = [&](int side) {
+      const Sides sides = possible_sides(cell.robot, one, Sides(static_cast<std::size_t>(one.size()), side));
+      return filter->keeps(one, {sides}, count);
+    };
+    may[static_cast<std::size_t>(i)] = inside && (comes(-1) || comes(1));
   }
   return may;
 }
@@ -335,19 +360,20 @@ Result<std::vector<bool>> plannable(const Cell& cell, const Eigen::MatrixXd& q) 
 Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell, const PlanOptions& options) {
   if (const Status counted = check_count(options); !counted) return tl::make_unexpected(counted.error());
   if (options.criterion == PlanCriterion::kCheck && options.bidirectional) {
-    return failure(ErrorCode::kUsage, "a check is planned from one side").of("--bidirectional");
+    return failure(ErrorCode::kUsage, "a check takes each pose once").of("--bidirectional");
   }
   const auto tools = resolved(*cell, options.tools, resolve_tool);
   if (!tools) return tl::make_unexpected(tools.error());
   const auto payloads = resolved(*cell, options.payloads, resolve_payload);
   if (!payloads) return tl::make_unexpected(payloads.error());
-  const Planning planning{cell, *tools, *payloads,
-                          options.bidirectional ? std::vector<int>{-1, 1} : std::vector<int>{-1}};
-  const Result<Filter> filter = Filter::of(*cell, planning.tools, planning.directions);
+  const Planning planning{cell, *tools, *payloads, options.bidirectional};
+  const Result<Filter> filter = Filter::of(*cell, planning.tools);
   if (!filter) return tl::make_unexpected(filter.error());
   const auto drawn = [&](int wanted, int largest_factor) {
-    return draw(*cell, *filter, wanted, options.count, largest_factor, options.seed,
-                [&](JointVector q) { return on_program_grid(cell->robot, std::move(q)); });
+    return draw(
+        *cell, *filter, wanted, options.count, largest_factor, options.seed,
+        [&](JointVector q) { return on_program_grid(cell->robot, std::move(q)); },
+        [&](const JointVector& q, std::size_t number) { return planning.ways(q, number); });
   };
   const Result<Drawn> latin_hypercube = drawn(options.count, kLargestFactor);
   if (!latin_hypercube) return tl::make_unexpected(latin_hypercube.error());
@@ -358,8 +384,8 @@ Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell, const PlanOption
   const Result<Drawn> candidates = drawn(
       std::max(check ? kCheckCandidates : kCandidates, kCandidatesForEachPose * options.count), kLargestDesignFactor);
   if (!candidates) return tl::make_unexpected(candidates.error());
-  if (check) return planned_check(planning, options, *candidates);
-  return designed(planning, options, *candidates, *latin_hypercube);
+  if (check) return planned_check(planning, options, *filter, *candidates);
+  return designed(planning, options, *filter, *candidates, *latin_hypercube);
 }
 
 }  // namespace trammel

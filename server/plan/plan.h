@@ -39,7 +39,7 @@ struct PlanOptions {
   std::uint64_t seed = 1;
   PlanCriterion criterion = PlanCriterion::kLatinHypercube;
   std::string cause = {}, other = {};   ///< for kSeparation: sources as written in the cell file
-  bool bidirectional = false;           ///< every pose twice, approached from both sides
+  bool bidirectional = false;           ///< every pose twice, all joints from above and all from below
   bool orientation = true;              ///< false: positions only will be measured
   std::vector<std::string> tools = {};  ///< to measure with in turn; empty: the cell's only one
   std::vector<std::string> payloads = {};
@@ -87,14 +87,14 @@ struct Plan {
   std::vector<SmallestEffect> smallest;
 };
 
-/// The poses of `list` (checked against the cell) as a plan, each with the pose of its approach: from the recorded side
-/// where all joints have the same, else from one that the limits allow. Refuses a pose that is too near to a limit to
-/// be approached.
+/// The poses of `list` (checked against the cell) as a plan, each with the pose of its approach: from the recorded
+/// sides where every joint has one, else from planned_sides() as far as the limits allow. Refuses a pose that is too
+/// near to a limit to be approached.
 [[nodiscard]] Result<Plan> plan_of(const Cell& cell, const JointList& list);
 
-/// A plan as the options say, each pose with the pose of its approach (by default from above, as in source section
-/// 3.2.4.2). Poses of one tool and payload come together, the most telling first. Refuses what plan_poses() refuses,
-/// unknown causes, tools and payloads, and a check with poses approached from both sides.
+/// A plan as the options say, each pose with the pose of its approach (source section 3.2.4.2): each joint comes from
+/// above as often as from below, see planned_sides(). Poses of one tool and payload come together, the most telling
+/// first. Refuses what plan_poses() refuses, unknown causes, tools and payloads, and a check with every pose twice.
 [[nodiscard]] Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell, const PlanOptions& options);
 
 }  // namespace trammel

@@ -52,10 +52,17 @@ TEST_F(PlanCommand, MakesAProgramOfPosesThatWereChosenElsewhere) {
   const JointList list = read_joint_csv(file("p.csv")).value();
   ASSERT_EQ(list.poses.size(), 2u);
   EXPECT_EQ(list.poses[0].pose_id, "n1");
-  EXPECT_EQ(list.poses[0].context.direction, std::vector<int>(6, 1));
+  EXPECT_EQ(list.poses[0].context.direction, std::vector<int>(6, -1));
+  EXPECT_EQ(list.poses[1].context.direction, std::vector<int>(6, 1)) << "joint 3 cannot come from above";
   EXPECT_NE(text("p.mod").find("[10,20,-30,40,50,60]"), std::string::npos) << text("p.mod");
   EXPECT_EQ(plan({"--from", chosen, "--count", "3", "-o", file("p.csv")}), 2);
   EXPECT_EQ(plan({"-o", file("p.csv")}), 2);
+}
+
+TEST_F(PlanCommand, APlanThatIsReadAgainKeepsItsSides) {
+  ASSERT_EQ(plan({"--count", "7", "-o", file("p.csv")}), 0);
+  ASSERT_EQ(plan({"--from", file("p.csv"), "-o", file("q.csv"), "--krl", file("q.src"), "--keep-order"}), 0);
+  EXPECT_EQ(text("q.csv"), text("p.csv"));
 }
 
 TEST_F(PlanCommand, EveryProgramReadsBackAsThePlanInItsOrder) {

@@ -14,19 +14,40 @@ namespace {
 TEST(Approach, TheBumpIsFiveDegreesOnTheSideTheJointsComeFrom) {
   const Chain robot = test::cell_7()->robot;
   const JointVector q = JointVector::Constant(6, 0.1);
-  EXPECT_TRUE(bump_pose(robot, q, -1)->isApprox(JointVector::Constant(6, 0.1 + from_deg(5))));
-  EXPECT_TRUE(bump_pose(robot, q, 1)->isApprox(JointVector::Constant(6, 0.1 - from_deg(5))));
+  EXPECT_TRUE(bump_pose(robot, q, Sides(6, -1))->isApprox(JointVector::Constant(6, 0.1 + from_deg(5))));
+  EXPECT_TRUE(bump_pose(robot, q, Sides(6, 1))->isApprox(JointVector::Constant(6, 0.1 - from_deg(5))));
+  const JointVector mixed = *bump_pose(robot, q, {1, -1, 1, 1, 1, 1});
+  EXPECT_NEAR(mixed(0), 0.1 - from_deg(5), 1e-12);
+  EXPECT_NEAR(mixed(1), 0.1 + from_deg(5), 1e-12);
 }
 
 TEST(Approach, TheBumpStaysWithinTheLimitsAndLeavesEnoughWay) {
   const Chain robot = test::cell_7()->robot;
   JointVector q = JointVector::Zero(6);
   q(1) = from_deg(83);  // 2 deg below its limit
-  EXPECT_NEAR((*bump_pose(robot, q, -1))(1), from_deg(85), 1e-12);
-  EXPECT_NEAR((*bump_pose(robot, q, 1))(1), from_deg(78), 1e-12);
+  EXPECT_NEAR((*bump_pose(robot, q, Sides(6, -1)))(1), from_deg(85), 1e-12);
+  EXPECT_NEAR((*bump_pose(robot, q, Sides(6, 1)))(1), from_deg(78), 1e-12);
   q(1) = from_deg(84.5);
-  EXPECT_FALSE(bump_pose(robot, q, -1));
-  EXPECT_TRUE(bump_pose(robot, q, 1));
+  EXPECT_FALSE(bump_pose(robot, q, Sides(6, -1)));
+  EXPECT_TRUE(bump_pose(robot, q, Sides(6, 1)));
+  EXPECT_EQ(possible_sides(robot, q, Sides(6, -1)), (Sides{-1, 1, -1, -1, -1, -1})) << "joint 2 can only rise into it";
+}
+
+TEST(Approach, EachJointComesFromBothSidesEquallyOftenAndNoTwoTogether) {
+  const Chain robot = test::cell_7()->robot;
+  std::vector<int> sum(6, 0);
+  Eigen::MatrixXi together = Eigen::MatrixXi::Zero(6, 6);
+  for (int number = 0; number < 48; ++number) {
+    const Sides sides = planned_sides(robot, number);
+    for (std::size_t a = 0; a < 6; ++a) {
+      sum[a] += sides[a];
+      for (std::size_t b = 0; b < 6; ++b) together(static_cast<int>(a), static_cast<int>(b)) += sides[a] * sides[b];
+    }
+    if (number % 2 == 1) {
+      EXPECT_EQ(sum, std::vector<int>(6, 0)) << number;
+    }
+  }
+  EXPECT_EQ(together, 48 * Eigen::MatrixXi::Identity(6, 6));
 }
 
 TEST(Approach, TheProgramGridNeverLeavesTheLimits) {
@@ -56,14 +77,40 @@ void expect_directions_are_those_of_the_bump(const Cell& cell, const Plan& plan)
   }
 }
 
-TEST(Approach, APlanComesFromAboveUnlessItIsBidirectional) {
+/// How much more often joint `j` of a plan comes from below than from above.
+int more_from_below(const Plan& plan, std::size_t j) {
+  int sum = 0;
+  for (const PlannedPose& pose : plan.poses) sum += pose.context.direction[j];
+  return sum;
+}
+
+TEST(Approach, APlanGoesBothWaysWhateverItsPosesAreChosenFor) {
+  const auto cell = test::cell_7();
+  for (const PlanCriterion criterion :
+       {PlanCriterion::kLatinHypercube, PlanCriterion::kObservability, PlanCriterion::kCheck}) {
+    const Plan plan = make_plan(cell, {20, 7, criterion}).value();
+    ASSERT_EQ(plan.poses.size(), 20u);
+    expect_directions_are_those_of_the_bump(*cell, plan);
+    for (std::size_t j = 0; j < 6; ++j) EXPECT_LE(std::abs(more_from_below(plan, j)), 2) << "joint " << j + 1;
+  }
+}
+
+TEST(Approach, AJointThatCanComeFromOneSideOnlyKeepsNoPoseOut) {
+  Cell cell = *test::cell_7();
+  const double upper = cell.robot.joint(4).upper;
+  cell.joint_ranges = planning_ranges(cell).value();
+  cell.joint_ranges[4] = {upper - from_deg(0.5), upper - from_deg(0.1)};
+  const auto shared = std::make_shared<const Cell>(cell);
+  const Plan plan = make_plan(shared, {20, 7}).value();
+  EXPECT_EQ(plan.draw.no_way, 0);
+  expect_directions_are_those_of_the_bump(cell, plan);
+  EXPECT_EQ(more_from_below(plan, 4), 20);
+  EXPECT_EQ(more_from_below(plan, 3), 0);
+}
+
+TEST(Approach, ABidirectionalPlanHasEveryPoseTwice) {
   const auto cell = test::cell_7();
   PlanOptions options{40, 7};
-  const Plan plan = make_plan(cell, options).value();
-  ASSERT_EQ(plan.poses.size(), 40u);
-  expect_directions_are_those_of_the_bump(*cell, plan);
-  for (const PlannedPose& pose : plan.poses) EXPECT_EQ(pose.context.direction[0], -1);
-
   options.bidirectional = true;
   const Plan both = make_plan(cell, options).value();
   ASSERT_EQ(both.poses.size(), 80u);

@@ -282,7 +282,8 @@ void add_plan_command(CLI::App& app, Action& chosen) {
           "from the second")
       ->capture_default_str();
   command->add_flag("--bidirectional", options.bidirectional,
-                    "Every pose twice, each joint approached from both sides (else from above only)");
+                    "Every pose twice, once with all joints from above and once from below (else once, each joint from "
+                    "above at one half of the poses and from below at the other)");
   command->add_flag("--positions-only", arguments->positions_only,
                     "Choose for a single reflector, which shows no orientations");
   command
