@@ -85,6 +85,12 @@ void shape(CdrWalk& walk, Of<ReplyHeader>) {
   walk.wides(1);
 }
 
+void shape(CdrWalk& walk, Of<Note>) {
+  token(walk, "note");
+  walk.enumerator("severity", NOTE_STOP);
+  sentence(walk, "note");
+}
+
 void shape(CdrWalk& walk, Of<ModelInfo>) {
   for (const char* field : {"cell", "id", "hash"}) told(walk, field);
   walk.text("level", MAX_SPELLING, Text::kAny);
@@ -95,6 +101,7 @@ void shape(CdrWalk& walk, Of<ModelInfo>) {
   walk.longs(1);
   walk.wides(1);
   walk.flag("in_force");
+  walk.list("notes", MAX_NOTES, 3 * kNumber, "note", [&] { shape(walk, Of<Note>()); });
 }
 
 void shape(CdrWalk& walk, Of<Joints>) { walk.wides(walk.list("joints_rad", MAX_JOINTS, 8)); }

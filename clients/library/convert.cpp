@@ -69,6 +69,13 @@ api::Error to_api(const Error& error) {
   return out;
 }
 
+std::vector<api::Note> to_api(const std::vector<Note>& notes) {
+  std::vector<api::Note> all;
+  all.reserve(notes.size());
+  for (const Note& note : notes) all.push_back({note.code, to_text(note.severity), note.text});
+  return all;
+}
+
 api::Pose to_api(const Pose& X_AB) {
   const Eigen::Quaterniond R(X_AB.linear());
   const Vector3 p = to_mm(1) * X_AB.translation();

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "clients/library/trammel/types.h"
+#include "server/base/note.h"
 #include "server/base/result.h"
 #include "server/robot/chain.h"
 
@@ -16,6 +17,8 @@ template <typename T>
 [[nodiscard]] tl::unexpected<api::Error> passed_on(const Result<T>& failed) {
   return tl::make_unexpected(to_api(failed.error()));
 }
+
+[[nodiscard]] std::vector<api::Note> to_api(const std::vector<Note>& notes);
 
 [[nodiscard]] api::Pose to_api(const Pose& X_AB);
 /// Refuses numbers that are not finite and quaternions that are not of length 1 within 1e-3.

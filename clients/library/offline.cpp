@@ -256,7 +256,8 @@ std::string Model::text() const { return serialize(inside_->model); }
 
 ModelFacts Model::facts() const {
   const ModelProvenance& from = inside_->model.provenance();
-  return {from.id, from.hash, inside_->model.cell().name, from.level, from.batch_id, from.training_poses, 0, false};
+  return {from.id, from.hash, inside_->model.cell().name, from.level, from.batch_id, from.training_poses, 0,
+          false,   notes()};
 }
 Cell Model::cell() const {
   const auto& cell = inside_->model.parts().physics.cell;
@@ -293,12 +294,7 @@ Evaluation Model::figures() const {
   return evaluation_of(parts.validation.value_or(parts.training));
 }
 
-std::vector<Note> Model::notes() const {
-  std::vector<Note> all;
-  for (const trammel::Note& note : notes_of(inside_->model))
-    all.push_back({note.code, to_text(note.severity), note.text});
-  return all;
-}
+std::vector<Note> Model::notes() const { return library::to_api(notes_of(inside_->model)); }
 
 Result<std::vector<Prediction>> Model::predict(std::span<const double> joints_deg, const Context& context) const {
   const CompensatedModel& model = inside_->model;

@@ -177,10 +177,16 @@ py::dict to_python(const std::vector<api::CorrectedTarget>& items, std::size_t j
       "message"_a = texts(items, [](const T& t) { return t.message; }));
 }
 
+py::list to_python(const std::vector<api::Note>& notes) {
+  return texts(notes, [](const api::Note& note) {
+    return py::dict("code"_a = note.code, "severity"_a = note.severity, "text"_a = note.text);
+  });
+}
+
 py::dict to_python(const api::ModelFacts& facts) {
   return py::dict("id"_a = facts.id, "hash"_a = facts.hash, "cell"_a = facts.cell, "level"_a = facts.level,
                   "batch"_a = facts.batch, "training_poses"_a = facts.training_poses, "version"_a = facts.version,
-                  "in_force"_a = facts.in_force);
+                  "in_force"_a = facts.in_force, "notes"_a = to_python(facts.notes));
 }
 
 py::dict to_python(const api::Figures& f) {
@@ -319,12 +325,6 @@ py::list parameters_of(const api::Model& model) {
   });
 }
 
-py::list notes_of(const api::Model& model) {
-  return texts(model.notes(), [](const api::Note& note) {
-    return py::dict("code"_a = note.code, "severity"_a = note.severity, "text"_a = note.text);
-  });
-}
-
 py::array_t<double> covariance_of(const api::Model& model) {
   const std::vector<double> flat = model.parameter_covariance();
   const auto size = static_cast<py::ssize_t>(model.parameters().size());
@@ -355,7 +355,7 @@ void add_model_file(py::class_<api::Model>& type) {
       .def("parameters", &parameters_of)
       .def("parameter_covariance", &covariance_of)
       .def("figures", [](const api::Model& model) { return to_python(model.figures()); })
-      .def("notes", &notes_of);
+      .def("notes", [](const api::Model& model) { return to_python(model.notes()); });
 }
 
 void add_model_work(py::class_<api::Model>& type) {

@@ -175,6 +175,11 @@ wire::Target to_wire(const TargetMm& target) {
   return result;
 }
 
+Note from_wire(const wire::Note& note) {
+  constexpr Note::Severity kSeverities[] = {Note::Severity::kInfo, Note::Severity::kWarning, Note::Severity::kStop};
+  return {note.code(), kSeverities[note.severity()], note.text()};
+}
+
 ModelInfo from_wire(const wire::ModelInfo& info) {
   ModelInfo result;
   result.cell = info.cell();
@@ -191,6 +196,7 @@ ModelInfo from_wire(const wire::ModelInfo& info) {
   result.training_poses = info.training_poses();
   result.validation_rms_mm = if_known(info.validation_rms_mm());
   result.in_force = info.in_force();
+  for (const wire::Note& note : info.notes()) result.notes.push_back(from_wire(note));
   return result;
 }
 

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "server/base/note.h"
+
 /// The arguments and results of a session. Units as on the wire: mm, rad; a prismatic joint in mm.
 namespace trammel::client {
 
@@ -34,6 +36,8 @@ struct ModelInfo {
   int training_poses = 0;
   std::optional<double> validation_rms_mm = {};  ///< empty: nothing was held out
   bool in_force = false;
+  /// What a user of the model should know, the gravest first. In a list of versions only the one in force has them.
+  std::vector<Note> notes = {};
 };
 
 /// How the arm comes to a pose; what is not known is neutral.

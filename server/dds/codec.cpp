@@ -45,6 +45,18 @@ void put_times(std::int64_t trained_at, const std::optional<std::int64_t>& measu
 std::string told(const std::string& text, std::size_t most_bytes) { return cut(shown(text), most_bytes); }
 std::string told_sentence(const std::string& text) { return cut(shown_lines(text), wire::MAX_SENTENCE); }
 
+wire::NoteSeverity to_wire(Note::Severity severity) {
+  switch (severity) {
+    case Note::Severity::kInfo:
+      return wire::NOTE_INFO;
+    case Note::Severity::kWarning:
+      return wire::NOTE_WARNING;
+    case Note::Severity::kStop:
+      return wire::NOTE_STOP;
+  }
+  TRAMMEL_CHECK(false);
+}
+
 double mm_or_unknown(const std::optional<double>& length) { return length ? to_mm(*length) : kUnknown; }
 
 }  // namespace
@@ -131,6 +143,18 @@ Status read_approach(const wire::Approach& approach, const Chain& chain, const s
   return {};
 }
 
+std::vector<wire::Note> to_wire(const std::vector<Note>& notes) {
+  std::vector<wire::Note> list;
+  for (const Note& note : notes) {
+    if (list.size() == wire::MAX_NOTES) break;
+    list.emplace_back();
+    list.back().code(told(note.code, wire::MAX_NAME));
+    list.back().severity(to_wire(note.severity));
+    list.back().text(told_sentence(note.text));
+  }
+  return list;
+}
+
 wire::ModelInfo to_wire(const ServedModel& served, bool in_force, std::int64_t now_unix_s) {
   const ModelProvenance& provenance = served.model.provenance();
   const auto& validation = served.model.parts().validation;
@@ -146,6 +170,7 @@ wire::ModelInfo to_wire(const ServedModel& served, bool in_force, std::int64_t n
   info.training_poses(provenance.training_poses);
   info.validation_rms_mm(validation ? to_mm(validation->compensated.rms) : kUnknown);
   info.in_force(in_force);
+  info.notes(to_wire(served.notes));
   return info;
 }
 

@@ -28,6 +28,8 @@ namespace trammel {
 [[nodiscard]] Status read_approach(const wire::Approach& approach, const Chain& chain, const std::string& where,
                                    PoseContext& context);
 
+/// The first MAX_NOTES.
+[[nodiscard]] std::vector<wire::Note> to_wire(const std::vector<Note>& notes);
 [[nodiscard]] wire::ModelInfo to_wire(const ServedModel& served, bool in_force, std::int64_t now_unix_s);
 [[nodiscard]] wire::ModelInfo to_wire(const StoredModel& stored, std::int64_t now_unix_s);
 /// As it is published: without its batches and times, which to_wire(DatedJob) has.

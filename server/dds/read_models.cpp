@@ -127,11 +127,13 @@ Result<ReadModelsReply> Handlers::models_of(const std::string& cell) const {
   std::map<std::string, std::string> hashes;  // by batch; of several batches together none is stored
   for (const StoredBatch& batch : *batches) hashes[batch.id] = batch.hash;
   ReadModelsReply reply;
+  const auto served = registry_.in_force(cell);
   const std::int64_t now = unix_now_s();
   for (std::size_t i = first_of_last(*models, wire::MAX_VERSIONS); i < models->size(); ++i) {
     reply.models().push_back(to_wire((*models)[i], now));
     const auto hash = hashes.find((*models)[i].batch_id);
     if (hash != hashes.end()) reply.models().back().batch_hash(hash->second);
+    if (served && served->version == (*models)[i].version) reply.models().back().notes(to_wire(served->notes));
   }
   return reply;
 }

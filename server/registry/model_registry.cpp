@@ -6,6 +6,7 @@
 
 #include "server/base/check.h"
 #include "server/bias/choose_bias.h"
+#include "server/compensate/model_notes.h"
 
 namespace trammel {
 namespace {
@@ -21,6 +22,9 @@ std::size_t bytes_at_flange(std::size_t poses) {
 }
 
 }  // namespace
+
+ServedModel::ServedModel(std::string of_cell, int of_version, CompensatedModel served)
+    : cell(std::move(of_cell)), version(of_version), model(std::move(served)), notes(notes_of(model)) {}
 
 std::size_t bytes_of(const CompensatedModel& model) {
   if (!model.bias()) return kRest;

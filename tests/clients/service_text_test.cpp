@@ -82,6 +82,21 @@ TEST(ServiceText, AModelsDatesAreThoseOfItsTrainingAndOfItsData) {
   EXPECT_TRUE(models_json({model})[0]["data_age_s"].is_null());
 }
 
+TEST(ServiceText, AModelsGraveNotesStandUnderTheTableAndProgramsGetAllOfThem) {
+  client::ModelInfo model;
+  model.cell = "cell-7";
+  model.version = 2;
+  model.notes = {{"robot_off_drawing", Note::Severity::kStop, "The robot file is not the controller's."},
+                 {"robot_not_confirmed", Note::Severity::kInfo, "Nobody compared it."}};
+  const std::string text = models_text({model});
+  EXPECT_NE(text.find("\ncell-7@2: stop: The robot file is not the controller's.\n"), std::string::npos) << text;
+  EXPECT_EQ(text.find("Nobody compared it."), std::string::npos) << text;
+  const auto notes = models_json({model})[0]["notes"];
+  ASSERT_EQ(notes.size(), 2u);
+  EXPECT_EQ(notes[0]["severity"], "stop");
+  EXPECT_EQ(notes[1]["code"], "robot_not_confirmed");
+}
+
 TEST(ServiceText, AnActivationSaysBeforeAfterLimitWhyAndTheNextCommand) {
   const nlohmann::ordered_json said = {
       {"version", 2},

@@ -756,6 +756,26 @@ TEST_F(HandlersTest, TheAgeOfTheDataIsThatOfTheNewestMeasurement) {
   EXPECT_TRUE(std::isnan(age(std::nullopt))) << "nobody recorded it";
 }
 
+TEST_F(HandlersTest, EveryAnswerOfAModelAndTheListSayWhatAUserOfItShouldKnow) {
+  const CompensatedModel model = test::shifted_model(backend_.cell, 1e-4);
+  for (const bool in_force : {false, true}) ASSERT_TRUE(backend_.store->add_model("cell-7", model, 0, in_force, ""));
+  backend_.registry.publish(std::make_shared<const ServedModel>(ServedModel{"cell-7", 2, model}));
+  const auto codes = [](const wire::ModelInfo& told) {
+    std::vector<std::string> all;
+    for (const wire::Note& note : told.notes()) all.push_back(note.code());
+    return all;
+  };
+  const std::vector<std::string> expected = {"robot_not_confirmed"};
+  EXPECT_EQ(codes(handlers_.answer(predict_request())->model()), expected);
+  EXPECT_EQ(codes(handlers_.answer(correct_request())->model()), expected);
+  const auto listed = handlers_.answer(read_request(wire::READ_MODELS));
+  ASSERT_EQ(listed->models().size(), 2u);
+  EXPECT_TRUE(codes(listed->models().front()).empty()) << "it is not loaded to be listed";
+  EXPECT_EQ(codes(listed->models().back()), expected);
+  EXPECT_EQ(listed->models().back().notes().front().severity(), wire::NOTE_INFO);
+  EXPECT_EQ(codes(listed->in_force()), expected);
+}
+
 TEST_F(HandlersTest, RepliesCarryTheIdOfTheirRequestAndTheServer) {
   test::Answered<wire::PredictError> calls(handlers_, "server-a");
   auto request = predict_request();

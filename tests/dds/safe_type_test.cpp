@@ -116,6 +116,11 @@ ModelInfo some_model() {
   model.level("M2,gear_transmission:3");
   model.batch_hash("0123");
   model.in_force(true);
+  Note note;
+  note.code("robot_not_confirmed");
+  note.severity(NOTE_STOP);
+  note.text("Nobody compared it.");
+  model.notes({note, note});
   return model;
 }
 

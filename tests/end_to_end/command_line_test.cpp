@@ -786,11 +786,14 @@ class CommandLineWithService : public CommandLine {
 TEST_F(CommandLineWithService, ASubmittedBatchIsTrainedListedExportedAndAnswersAsTheFileDoes) {
   const std::string batch = measure("first", 40, 1);
   const Finished submitted = must_answer({"submit", "--cell", cell_, "--batch", batch, "--watch", "--json", "-"});
-  EXPECT_EQ(json::parse(submitted.out).at("stage"), "done");
+  const json made = json::parse(submitted.out);
+  EXPECT_EQ(made.at("stage"), "done");
+  EXPECT_EQ(codes_of(made.at("notes")).back(), "robot_not_confirmed");
 
   const json status = json::parse(must_answer({"status", "--json", "-"}).out);
   EXPECT_EQ(status.at("servers").size(), 1u);
   EXPECT_EQ(status.at("models").at(0).at("cell"), "cell-7");
+  EXPECT_EQ(status.at("models").at(0).at("notes"), made.at("notes"));
   const json models = json::parse(must_answer({"models", "--cell", "cell-7", "--json", "-"}).out).at("models");
   ASSERT_EQ(models.size(), 1u);
   EXPECT_EQ(models.at(0).at("batch"), "first");
@@ -798,8 +801,10 @@ TEST_F(CommandLineWithService, ASubmittedBatchIsTrainedListedExportedAndAnswersA
 
   must_answer({"export", "--model", "cell-7", "-o", file("served.model")});
   must({"predict", "--model", file("served.model"), "--joints", batch, "-o", file("here.csv")});
-  must_answer({"predict", "--model", "cell-7@1", "--joints", batch, "-o", file("there.csv")});
+  const Finished predicted =
+      must_answer({"predict", "--model", "cell-7@1", "--joints", batch, "-o", file("there.csv"), "--json", "-"});
   EXPECT_EQ(test::read_file(file("there.csv")), test::read_file(file("here.csv")));
+  EXPECT_EQ(json::parse(predicted.out).at("notes"), made.at("notes"));
   must({"correct", "--model", file("served.model"), file("first-plan.csv"), "-o", file("here.csv"), "--allow-failed"});
   must_answer({"correct", "--model", "cell-7", file("first-plan.csv"), "-o", file("there.csv"), "--allow-failed"});
   EXPECT_EQ(test::read_file(file("there.csv")), test::read_file(file("here.csv")));

@@ -77,7 +77,7 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
     asked.served = true;
     poses.push_back(std::move(asked));
   }
-  Predictions predictions{model->provenance().id, {}};
+  Predictions predictions{model->provenance().id, {}, {}, {}, notes_of(*model)};
   ProgressLine progress;
   for (std::size_t from = 0; from < poses.size(); from += kPosesTogether) {
     progress.show("predicting", static_cast<double>(from) / static_cast<double>(poses.size()));
@@ -114,7 +114,7 @@ Result<Predictions> predict_by_service(const JointList& list, const ApplyArgumen
   auto answer =
       (*session)->predict_error_at(*context, poses, [&](double share) { progress.show("predicting", share); });
   if (!answer) return tl::make_unexpected(answer.error());
-  return Predictions{answer->model.id, std::move(answer->items)};
+  return Predictions{answer->model.id, std::move(answer->items), {}, {}, std::move(answer->model.notes)};
 }
 
 /// What --covariance and --orientation ask for.
@@ -136,6 +136,7 @@ Status predict(const ApplyArguments& arguments) {
   Result<Predictions> predictions =
       arguments.service.service ? predict_by_service(*list, arguments) : predict_here(*list, arguments);
   if (!predictions) return tl::make_unexpected(predictions.error());
+  warn_of_notes(predictions->notes);
   if (const Status added = add_uncertainties(*predictions, arguments); !added) return added;
   return write_together({{"--output", arguments.output, predictions_csv(*list, *predictions)},
                          {"--json", arguments.json, json_text(predictions_json(*list, *predictions))}});
@@ -152,7 +153,6 @@ Result<Corrections> correct_here(const TargetFile& file, const ApplyArguments& a
   if (const Status known = model->check_trained_with(*tool, *payload); !known)
     return tl::make_unexpected(known.error());
   Corrections corrections{model->provenance().id, joint_types(model->cell().robot), {}, notes_of(*model)};
-  warn_of_notes(corrections.notes);
   corrections.items.resize(file.rows.size());
   ProgressLine progress;
   in_parallel(
@@ -179,7 +179,7 @@ Result<Corrections> correct_by_service(const TargetFile& file, const ApplyArgume
   const bool all_unreachable = std::all_of(answer->items.begin(), answer->items.end(),
                                            [](const auto& item) { return item.status == "unreachable"; });
   if (all_unreachable && may_be_metres(file)) return tl::make_unexpected(looks_like_metres(file));
-  return Corrections{answer->model.id, file.joint_types, std::move(answer->items)};
+  return Corrections{answer->model.id, file.joint_types, std::move(answer->items), std::move(answer->model.notes)};
 }
 
 /// What correct is asked for, a program or a table of targets.
@@ -251,6 +251,7 @@ Result<Extent> correct(CorrectArguments arguments) {
   const Result<Corrections> corrections =
       arguments.service.service ? correct_by_service(*file, arguments) : correct_here(*file, arguments);
   if (!corrections) return tl::make_unexpected(corrections.error());
+  warn_of_notes(corrections->notes);
   const std::string left_alone = left_alone_text(*file, *corrections);
   const auto verdict = verdict_of(*corrections, arguments.tolerance_mm);
   if (arguments.strict) {

@@ -10,11 +10,13 @@
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/evaluation_text.h"
+#include "clients/cli/text/notes_text.h"
 #include "clients/cli/text/service_text.h"
 #include "server/base/text_file.h"
 #include "server/compensate/model_file.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/report/cell_health.h"
+#include "server/report/note_json.h"
 
 namespace trammel::cli {
 
@@ -37,6 +39,16 @@ Extent extent_of(const client::JobStatus& job) {
   return job.model_version == 0 || put_in_force(job) ? Extent::kAll : Extent::kPart;
 }
 
+/// What a user of the model should know that the job put in force.
+Result<std::vector<Note>> notes_of_made(client::Session& session, const client::JobStatus& job) {
+  if (!put_in_force(job)) return std::vector<Note>();
+  const Result<std::vector<client::ModelInfo>> models = session.models(job.cell);
+  if (!models) return tl::make_unexpected(models.error());
+  const auto made = std::find_if(models->begin(), models->end(),
+                                 [&](const client::ModelInfo& model) { return model.version == job.model_version; });
+  return made == models->end() ? std::vector<Note>() : made->notes;
+}
+
 /// Follows a job to its end; a failed one is an error.
 Result<Extent> follow(client::Session& session, std::int64_t job, const ServiceArguments& arguments) {
   const Result<client::JobStatus> end = [&] {
@@ -48,9 +60,11 @@ Result<Extent> follow(client::Session& session, std::int64_t job, const ServiceA
                                 });
   }();
   if (!end) return tl::make_unexpected(end.error());
-  if (const Status written = write_json(arguments.json, job_json(*end)); !written) {
-    return tl::make_unexpected(written.error());
-  }
+  const Result<std::vector<Note>> notes = notes_of_made(session, *end);
+  if (!notes) return tl::make_unexpected(notes.error());
+  ordered_json json = job_json(*end);
+  json["notes"] = notes_json(*notes);
+  if (const Status written = write_json(arguments.json, json); !written) return tl::make_unexpected(written.error());
   const std::string next = next_step(*end);
   if (end->stage == "failed" || end->stage == "cancelled") {
     return refused("job {} of cell {} {}: {}", end->job, end->cell, end->stage, end->what)
@@ -58,6 +72,7 @@ Result<Extent> follow(client::Session& session, std::int64_t job, const ServiceA
         .with_value(end->job)
         .next(next);
   }
+  warn_of_notes(*notes);
   tell(ended_text(*end) + (next.empty() ? "" : next + "\n"), {arguments.json});
   return extent_of(*end);
 }

@@ -205,7 +205,7 @@ ordered_json predictions_json(const JointList& list, const Predictions& predicti
                          {"sly_mm", u.sly_mm},
                          {"slz_mm", u.slz_mm}});
   }
-  return {{"model", predictions.model_id}, {"predictions", items}};
+  return {{"model", predictions.model_id}, {"notes", notes_json(predictions.notes)}, {"predictions", items}};
 }
 
 namespace {

@@ -46,12 +46,13 @@ struct Predictions {
   std::vector<client::PredictedError> items;     ///< one a pose of the list
   std::vector<JointUncertainty> together = {};   ///< likewise where it was asked for, else none
   std::vector<RotationUncertainty> turned = {};  ///< likewise
+  std::vector<Note> notes = {};                  ///< of the model
 };
 struct Corrections {
   std::string model_id;
   std::vector<JointType> joint_types;
   std::vector<client::CorrectedTarget> items;  ///< one a target
-  std::vector<Note> notes = {};                ///< of the model, where it is at hand
+  std::vector<Note> notes = {};                ///< of the model
 };
 
 /// `dx_mm` ... `in_domain`, the predicted pose X_BT, `pose_id`, `model_id`; where asked for, `cxy_mm2` ... `slz_mm` and

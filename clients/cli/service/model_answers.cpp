@@ -1,5 +1,7 @@
 #include "clients/cli/service/model_answers.h"
 
+#include "server/compensate/model_notes.h"
+
 namespace trammel::cli {
 
 cam::CellTools tools_of(const CompensatedModel& model) { return {model.parts().physics.tools, model.cell().payloads}; }
@@ -26,6 +28,7 @@ client::ModelInfo info_of(const CompensatedModel& model) {
   info.trained_at_unix_s = provenance.trained_at;
   info.measured_at_unix_s = provenance.measured_at;
   info.training_poses = provenance.training_poses;
+  info.notes = notes_of(model);
   return info;
 }
 

@@ -5,7 +5,9 @@
 #include <map>
 #include <optional>
 
+#include "clients/cli/text/notes_text.h"
 #include "server/error_sources/cause_words.h"
+#include "server/report/note_json.h"
 
 namespace trammel::cli {
 
@@ -42,7 +44,8 @@ ordered_json model_json(const client::ModelInfo& model) {
           {"measured_at_unix_s", if_known(model.measured_at_unix_s)},
           {"data_age_s", if_known(model.data_age_s)},
           {"training_poses", model.training_poses},
-          {"validation_rms_mm", if_known(model.validation_rms_mm)}};
+          {"validation_rms_mm", if_known(model.validation_rms_mm)},
+          {"notes", notes_json(model.notes)}};
 }
 
 std::string kind_in_words(const std::string& kind) {
@@ -134,7 +137,12 @@ std::string models_text(const std::vector<client::ModelInfo>& models) {
                         date_text(model.trained_at_unix_s), date_text(model.measured_at_unix_s.value_or(0)),
                         level_in_words(model.level));
   }
-  return text + "  (* in force; dates in UTC)\n";
+  text += "  (* in force; dates in UTC)\n";
+  for (const client::ModelInfo& model : models) {
+    for (const Note& note : grave(model.notes))
+      text += fmt::format("{}@{}: {}", model.cell, model.version, notes_text({note}));
+  }
+  return text;
 }
 
 namespace {

@@ -60,23 +60,24 @@ struct CorrectedTarget {
   std::string message;             ///< why it is not ok
 };
 
-/// Which model answered.
-struct ModelFacts {
-  std::string id;          ///< first 12 characters of the hash
-  std::string hash;        ///< SHA-256 of the model's content
-  std::string cell;        ///< its cell
-  std::string level;       ///< its error sources, joined by commas
-  std::string batch;       ///< batch that it was trained on
-  int training_poses = 0;  ///< how many it learned from
-  int version = 0;         ///< of a service; 0: from a file
-  bool in_force = false;   ///< of a service: whether its cell is served with it
-};
-
 /// What a user of a model should know, in the words of the command line and of the service.
 struct Note {
   std::string code;      ///< for programs: `robot_not_confirmed`
   std::string severity;  ///< `info`; `warning`: figures mean less than they seem to; `stop`: a person must look first
   std::string text;      ///< for people
+};
+
+/// Which model answered.
+struct ModelFacts {
+  std::string id;           ///< first 12 characters of the hash
+  std::string hash;         ///< SHA-256 of the model's content
+  std::string cell;         ///< its cell
+  std::string level;        ///< its error sources, joined by commas
+  std::string batch;        ///< batch that it was trained on
+  int training_poses = 0;   ///< how many it learned from
+  int version = 0;          ///< of a service; 0: from a file
+  bool in_force = false;    ///< of a service: whether its cell is served with it
+  std::vector<Note> notes;  ///< the gravest first; in a service's list of versions only of the one in force
 };
 
 /// Told what is being done and which share of it is done, [0, 1]. Returns false to give up (kBusy).

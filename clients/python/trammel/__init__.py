@@ -434,7 +434,7 @@ class Session:
         return self._inside.servers()
 
     def models(self, cell: str = "") -> List[Dict[str, Any]]:
-        """The models of a cell, or those in force of all: `id hash cell level batch training_poses version in_force`."""
+        """The models of a cell, or those in force of all: `id hash cell level batch training_poses version in_force notes`."""
         return self._inside.models(cell)
 
     def export_model(self, cell: str, version: int = 0) -> str:
