@@ -1,7 +1,7 @@
 // A check's residuals are tested for each single cause beside base (and tool), for single bad poses, and as a whole.
 // What explains most for its number of parameters (Schwarz's price, log R for each) is taken: a bad pose is refitted
 // with the base, a cause is a change, and the rest is tested again. Effects are linear in the cause; of a large one
-// kUnlinear may be left over.
+// kUnlinear may be left over. Zeros of several joints come first, as one explanation of all poses, and are not linear.
 #include "server/health/health_check.h"
 
 #include <algorithm>
@@ -14,9 +14,11 @@
 #include "server/calibrate/batch_check.h"
 #include "server/compensate/known_rows.h"
 #include "server/health/evidence/check_tests.h"
+#include "server/health/evidence/lost_zeros.h"
 #include "server/health/evidence/working_poses.h"
 #include "server/measurement/gauges.h"
 #include "server/measurement/sessions.h"
+#include "server/numerics/chi_square.h"
 
 namespace trammel {
 
@@ -25,10 +27,13 @@ namespace {
 using Eigen::Index;
 using health::CheckRows;
 using health::CheckTests;
+using health::Estimate;
 using health::HealthyChecks;
 using health::Hypothesis;
 using health::RefittedRows;
 using health::Sifted;
+using health::ZerosFit;
+using health::ZerosSearch;
 
 constexpr int kMostCauses = 3;         // that a check may name
 constexpr int kRounds = 3;             // of looking at each of them again beside the others
@@ -37,6 +42,9 @@ constexpr double kCredible = 0.99;     // of all single causes' odds: those that
 constexpr double kUnlinear = 0.003;    // of an effect
 constexpr double kDoubtful = 0.02;     // chance from which on nothing is said for certain
 constexpr double kNearlySeen = 10;     // times the limit: a cause that is named where the whole is beyond chance
+constexpr double kZeroGains = 10;      // beyond its price: a zero that is named beside others is so once in 5000
+constexpr double kMadeUpFor = 0.01;    // of an effect: so little left of it is not told from what makes up for it
+constexpr int kFewestChecks = 3;       // that say how fast an arm drifts
 constexpr double kExtrapolated = 10;   // times what the poses are off by: an effect that large is not seen in them
 constexpr double kFarOff = kNeverOff;  // m rms, base refitted: no small change, and effects are no longer linear
 
@@ -58,23 +66,69 @@ std::string date_of(std::int64_t unix_s) {
   return fmt::format("{:04}-{:02}-{:02}", utc.tm_year + 1900, utc.tm_mon + 1, utc.tm_mday);
 }
 
-/// How large an effect is over the working poses, and U(k=2).
+/// How large an effect is, and U(k=2).
 struct Size {
   double rms = 0, u95 = 0;
 };
+
+/// `2, 4 and 5`, `2 to 5`; joints are 0-based.
+std::string joints_in_words(const std::vector<LostZero>& zeros) {
+  const int first = zeros.front().joint + 1, last = zeros.back().joint + 1;
+  const auto count = static_cast<int>(zeros.size());
+  if (count > 2 && last - first + 1 == count) return fmt::format("{} to {}", first, last);
+  std::string text = std::to_string(first);
+  for (int k = 1; k < count; ++k)
+    text += fmt::format("{}{}", k + 1 < count ? ", " : " and ", zeros[static_cast<std::size_t>(k)].joint + 1);
+  return text;
+}
+
+/// `lost zero in joint 2 (by 0.100 +- 0.002 deg)`, `the zeros of joints 2 and 4: was it remastered? (...)`.
+std::string change_in_words(const SeenChange& change) {
+  if (change.zeros.empty()) return in_words(change.cause);
+  std::vector<std::string> each;
+  for (const LostZero& zero : change.zeros)
+    each.push_back(fmt::format("{}by {:.3f} +- {:.3f} deg",
+                               change.zeros.size() > 1 ? fmt::format("joint {} ", zero.joint + 1) : "", to_deg(zero.by),
+                               to_deg(zero.u95)));
+  const std::string what =
+      change.zeros.size() > 1 ? fmt::format("the zeros of joints {}: was it remastered?", joints_in_words(change.zeros))
+                              : in_words(change.cause);
+  return fmt::format("{} ({})", what, fmt::join(each, ", "));
+}
+
+bool is_zero(const SingleCause& cause) {
+  return cause.record == &first_searched_by(causes::SearchFamily::kZeroStep) && !cause.any_function;
+}
+
+SingleCause unknown_cause() {
+  SingleCause unknown;
+  unknown.record = &cause_that_stands_for(causes::StandsFor::kNoKnownCause);
+  return unknown;
+}
+
+void add_rival(const SingleCause& rival, SeenChange& change) {
+  const auto same = [&](const SingleCause& known) { return same_cause(known, rival); };
+  const bool known = std::any_of(change.could_also_be.begin(), change.could_also_be.end(), same);
+  if (!known && !same(change.cause)) change.could_also_be.push_back(rival);
+}
+
+std::string rival_in_words(const SingleCause& cause) {
+  return is_zero(cause) && cause.joint < 0 ? "lost zeros in several joints" : in_words(cause);
+}
 
 /// One check, while it is looked through.
 class Examination {
  public:
   Examination(const HealthOptions& options, const CauseEffects& effects, const WorkingPoses& working, CheckRows rows,
-              int tail_freedom)
+              int tail_freedom, const Chain& robot)
       : options_(options),
         effects_(effects),
         working_(working),
         rows_(std::move(rows)),
         signals_(working.signals(effects, options.seed)),
         questions_(questions()),
-        healthy_(rows_, frames(), questions_, tail_freedom, options.seed),
+        healthy_(rows_, frames_of(rows_), questions_, tail_freedom, options.seed),
+        zeros_(effects_, rows_, zeros_of(robot), options.new_tool),
         covariance_(rows_.covariance) {}
 
   HealthCheck result(const CheckTimes& times) {
@@ -82,10 +136,15 @@ class Examination {
     check_.tolerance = options_.tolerance;
     check_.not_asked = effects_.not_asked();
     sifted_ = healthy_.sifted(rows_.residual);
+    const std::optional<ZerosFit> zeros = lost_zeros(healthy_.tests({}));
     for (const int pose : sifted_.bad) check_.suspects.push_back(rows_.pose_ids[static_cast<std::size_t>(pose)]);
     check_.p_value = healthy_.chance_of(sifted_.smallest_p);
     const CheckTests& tests = healthy_.tests(sifted_.bad);
-    look_for_changes(tests);
+    if (zeros) {
+      tell_zeros(*zeros);
+    } else {
+      look_for_changes(tests);
+    }
     tell_rms(tests.rows());
     tell_smallest(tests);
     tell_due(tests.rows(), times);
@@ -107,11 +166,34 @@ class Examination {
     return questions;
   }
   /// Refitted in a healthy robot.
-  [[nodiscard]] Eigen::MatrixXd frames() const {
-    if (!options_.new_tool) return rows_.by_base;
-    return joined(rows_.by_base, rows_.by_cause(Eigen::all, effects_.tool_columns()));
+  [[nodiscard]] Eigen::MatrixXd frames_of(const CheckRows& rows) const {
+    if (!options_.new_tool) return rows.by_base;
+    return joined(rows.by_base, rows.by_cause(Eigen::all, effects_.tool_columns()));
   }
+  /// Causes that are a turning joint's zero, and that base (and tool) do not make up for.
+  [[nodiscard]] std::vector<std::size_t> zeros_of(const Chain& robot) const;
+  /// Zeros that several joints lost, or one by much, where nothing simpler explains all poses as well and they leave
+  /// nothing beyond chance.
+  [[nodiscard]] std::optional<ZerosFit> lost_zeros(const CheckTests& tests);
+  /// By Schwarz, above no change, which leaves `whole`.
+  [[nodiscard]] double score_of(const ZerosFit& fit, double whole) const {
+    return whole - fit.left - price(fit.numbers);
+  }
+  [[nodiscard]] double price(int numbers) const {
+    return std::log(static_cast<double>(rows_.residual.size())) * numbers;
+  }
+  /// Whether a single cause, or the bad poses that were found, explain as much for their numbers.
+  [[nodiscard]] bool has_simpler(const CheckTests& tests, const Eigen::VectorXd& left, double score);
+  void tell_zeros(const ZerosFit& fit);
+  void tell_tool_beside(const ZerosFit& fit, const CheckRows& there);
+  void tell_other_sets(const ZerosFit& fit, SeenChange& change) const;
+  /// What explains as much as the cause does beside `others`.
+  void tell_rivals_beside(const CheckRows& there, const Eigen::MatrixXd& others, std::size_t cause,
+                          SeenChange& change) const;
+  /// Several zeros that explain as much as what was named does.
+  void tell_several_zeros(double left, SeenChange& change) const;
   void look_for_changes(const CheckTests& healthy);
+  void tell_what_is_left();
   /// m rms of the positions, refitted.
   [[nodiscard]] double distance_of(const RefittedRows& refitted) const;
   /// Whether the cause is a tool that sits elsewhere, whose shift stays linear however far it is.
@@ -122,12 +204,19 @@ class Examination {
   void look_back();
   /// The cause that explains most for its price; empty: none explains anything.
   [[nodiscard]] std::optional<std::size_t> likeliest(const CheckTests& tests, const Eigen::VectorXd& left) const;
-  /// The same, though its size may be far beyond what these poses show.
+  [[nodiscard]] bool may_be_named(std::size_t hypothesis, const CheckTests& tests, const Eigen::VectorXd& left) const;
+  /// The likeliest, though its size may be far beyond what these poses show.
   [[nodiscard]] std::size_t most_explained(const CheckTests& tests, const Eigen::VectorXd& left) const;
   /// Refitted besides: all that were named but the one at `k`.
   [[nodiscard]] CheckTests beside_others(std::size_t k) const;
   void refit_named();
-  [[nodiscard]] Size size(std::size_t hypothesis, const RefittedRows& refitted, Eigen::VectorXd* theta) const;
+  [[nodiscard]] Estimate estimated(std::size_t hypothesis, const RefittedRows& refitted) const;
+  /// Over the working poses.
+  [[nodiscard]] Size size(std::size_t hypothesis, const Estimate& found) const;
+  /// What these columns do at the check's poses: k x k, m².
+  [[nodiscard]] Eigen::MatrixXd square_here(const Eigen::MatrixXd& columns, const RefittedRows& refitted) const;
+  /// `over`, or where it is more than the poses are off by, what they show of it.
+  void set_size(const Size& over, const Estimate& found, const Eigen::MatrixXd& here, SeenChange& change) const;
   /// Whether it would do far more elsewhere than these poses are off by: they do not show it.
   [[nodiscard]] bool is_extrapolated(std::size_t hypothesis, const RefittedRows& refitted) const;
   void tell_change(const Named& named, const CheckTests& tests);
@@ -151,6 +240,8 @@ class Examination {
   const std::vector<CauseSignal> signals_;
   const health::Questions questions_;
   HealthyChecks healthy_;
+  const ZerosSearch zeros_;
+  std::vector<ZerosFit> fits_;  // of `zeros_`, where something is beyond chance
   Sifted sifted_;
   Eigen::MatrixXd covariance_;  // with what a change that was found may leave over
   Eigen::MatrixXd always_;      // refitted: frames and bad poses
@@ -162,33 +253,24 @@ class Examination {
   HealthCheck check_;
 };
 
-/// Of columns with `own` (R x k, whitened, refitted), fitted to `left`.
-Size size_of(const Eigen::MatrixXd& own, const Eigen::VectorXd& left, const Eigen::MatrixXd& left_square,
-             Eigen::VectorXd* theta) {
-  const auto solver = own.completeOrthogonalDecomposition();
-  *theta = solver.solve(left);
-  const Eigen::MatrixXd inverse = solver.pseudoInverse();
-  const Eigen::MatrixXd covariance = inverse * inverse.transpose();
-  const double found = theta->dot(left_square * *theta);
-  const double by_noise = (left_square * covariance).trace();
-  const double rms = std::sqrt(std::max(found - by_noise, 0.0));
-  const Eigen::VectorXd gradient = left_square * *theta / std::max(std::sqrt(found), 1e-12);
-  return {rms, 2 * std::sqrt(gradient.dot(covariance * gradient))};
+/// Of what numbers do whose squared effect is w' `square` w.
+Size size_of(const Estimate& found, const Eigen::MatrixXd& square) {
+  const double whole = found.numbers.dot(square * found.numbers);
+  const double by_noise = (square * found.covariance).trace();
+  const Eigen::VectorXd gradient = square * found.numbers / std::max(std::sqrt(whole), 1e-12);
+  return {std::sqrt(std::max(whole - by_noise, 0.0)), 2 * std::sqrt(gradient.dot(found.covariance * gradient))};
 }
 
-/// Of a joint's angle that is off by anything at each pose.
-Size size_of_any(const Eigen::MatrixXd& own, const Eigen::VectorXd& left, double working_rms, Eigen::VectorXd* theta) {
-  const auto solver = own.completeOrthogonalDecomposition();
-  *theta = solver.solve(left);
-  const Eigen::MatrixXd inverse = solver.pseudoInverse();
-  const double poses = static_cast<double>(theta->size());
-  const double by_noise = inverse.squaredNorm() / poses;
-  const double square = std::max(theta->squaredNorm() / poses - by_noise, 0.0);
-  return {working_rms * std::sqrt(square), 2 * working_rms * std::sqrt(by_noise / 2)};
+/// Of a joint's angle that is off by anything at each pose, each of `rms` where it is off by one prior scale.
+Size size_of_any(const Estimate& found, double rms) {
+  const auto poses = static_cast<double>(found.numbers.size());
+  const double by_noise = found.covariance.trace() / poses;
+  const double square = std::max(found.numbers.squaredNorm() / poses - by_noise, 0.0);
+  return {rms * std::sqrt(square), 2 * rms * std::sqrt(by_noise / 2)};
 }
 
 void Examination::look_for_changes(const CheckTests& healthy) {
-  always_ = frames();
+  always_ = frames_of(rows_);
   for (const int pose : sifted_.bad)
     always_ = joined(always_, questions_.hypotheses[questions_.causes + static_cast<std::size_t>(pose)].columns);
   nuisance_ = always_;
@@ -201,6 +283,162 @@ void Examination::look_for_changes(const CheckTests& healthy) {
   }
   for (std::size_t k = 0; k < named_.size(); ++k)
     tell_change(named_[k], named_.size() == 1 ? healthy : beside_others(k));
+  if (!named_.empty()) tell_what_is_left();
+}
+
+/// What was named is not all, or not the only way to say it.
+void Examination::tell_what_is_left() {
+  const CheckTests tests(covariance_, nuisance_, questions_);
+  const bool is_all = tests.smallest_p(tests.rows().left(rows_.residual)) >= healthy_.limit(options_.false_alarm);
+  const double left = RefittedRows(rows_.covariance, nuisance_).left(rows_.residual).squaredNorm();
+  for (SeenChange& change : check_.changed) {
+    tell_several_zeros(left, change);
+    if (!is_all) add_rival(unknown_cause(), change);
+  }
+}
+
+void Examination::tell_several_zeros(double left, SeenChange& change) const {
+  const auto is_in = [&](const Named& named, const ZerosFit& fit) {
+    const std::size_t cause = questions_.hypotheses[named.hypothesis].cause;
+    if (is_tool(named.hypothesis)) return fit.tool;
+    return std::find(fit.zeros.begin(), fit.zeros.end(), cause) != fit.zeros.end();
+  };
+  for (const ZerosFit& fit : fits_) {
+    const bool is_more_of_it =
+        std::all_of(named_.begin(), named_.end(), [&](const Named& named) { return is_in(named, fit); });
+    if (fit.zeros.empty() || is_more_of_it || fit.left > left + kAlike) continue;
+    SingleCause zeros = effects_.causes()[fit.zeros.front()].cause;
+    if (fit.zeros.size() > 1) zeros.joint = -1;
+    add_rival(zeros, change);
+  }
+}
+
+std::vector<std::size_t> Examination::zeros_of(const Chain& robot) const {
+  std::vector<std::size_t> zeros;
+  for (std::size_t h = 0; h < questions_.causes; ++h) {
+    const SingleCause& cause = effects_.causes()[questions_.hypotheses[h].cause].cause;
+    if (is_zero(cause) && robot.joint(cause.joint).type == JointType::kRevolute)
+      zeros.push_back(questions_.hypotheses[h].cause);
+  }
+  return zeros;
+}
+
+std::optional<ZerosFit> Examination::lost_zeros(const CheckTests& tests) {
+  constexpr int kFewestLeft = 3;  // numbers that can speak against it
+  const Eigen::VectorXd left = tests.rows().left(rows_.residual);
+  const double limit = healthy_.limit(options_.false_alarm);
+  const double smallest = tests.smallest_p(left);
+  off_ = distance_of(tests.rows());
+  if (smallest >= limit) return std::nullopt;
+  fits_ = zeros_.all();
+  if (fits_.empty()) return std::nullopt;
+  const auto cost = [&](const ZerosFit& fit) {
+    return fit.left + price(fit.numbers) + kZeroGains * (static_cast<double>(fit.zeros.size()) + (fit.tool ? 1 : 0));
+  };
+  const ZerosFit& best = *std::min_element(fits_.begin(), fits_.end(),
+                                           [&](const ZerosFit& a, const ZerosFit& b) { return cost(a) < cost(b); });
+  const bool is_one_linear = best.zeros.size() == 1 && !best.tool && off_ < kFarOff;
+  const int freedom = tests.rows().freedom() - best.numbers;
+  if (best.zeros.empty() || is_one_linear || freedom < kFewestLeft || chi_square_tail(best.left, freedom) < limit)
+    return std::nullopt;
+  if (has_simpler(tests, left, score_of(best, left.squaredNorm()))) return std::nullopt;
+  sifted_ = {{}, smallest};
+  return best;
+}
+
+bool Examination::has_simpler(const CheckTests& tests, const Eigen::VectorXd& left, double score) {
+  const std::vector<double> scores = tests.scores(left);
+  for (std::size_t h = 0; h < scores.size(); ++h) {
+    const bool is_flexible =
+        h < questions_.causes && effects_.causes()[questions_.hypotheses[h].cause].cause.any_function;
+    if (scores[h] > score + (is_flexible ? kAlike : 0)) return true;
+  }
+  const RefittedRows& without_bad = healthy_.tests(sifted_.bad).rows();
+  const double by_bad = left.squaredNorm() - without_bad.left(rows_.residual).squaredNorm();
+  return by_bad - price(tests.rows().freedom() - without_bad.freedom()) > score;
+}
+
+void Examination::tell_zeros(const ZerosFit& fit) {
+  const CheckRows there = zeros_.around(fit);
+  const auto count = static_cast<Index>(fit.zeros.size());
+  const std::vector<Index> columns(fit.columns.begin(), fit.columns.begin() + count);
+  const Estimate found{fit.at(columns), fit.covariance.topLeftCorner(count, count)};
+  SeenChange change;
+  change.cause = effects_.causes()[fit.zeros.front()].cause;
+  change.p_value = check_.p_value;
+  for (Index k = 0; k < count; ++k) {
+    const double scale = effects_.scale(columns[static_cast<std::size_t>(k)]);
+    change.zeros.push_back({effects_.causes()[fit.zeros[static_cast<std::size_t>(k)]].cause.joint,
+                            scale * found.numbers(k), 2 * scale * std::sqrt(found.covariance(k, k))});
+  }
+  if (count > 1) change.cause.joint = -1;
+  set_size(size_of(found, working_.left_square(columns)), found,
+           square_here(there.by_cause(Eigen::all, columns), RefittedRows(rows_.covariance, frames_of(there))), change);
+  tell_other_sets(fit, change);
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    std::vector<Index> others = fit.columns;
+    std::erase(others, columns[k]);
+    tell_rivals_beside(there, joined(frames_of(there), there.by_cause(Eigen::all, others)), fit.zeros[k], change);
+  }
+  check_.changed.push_back(std::move(change));
+  if (fit.tool) tell_tool_beside(fit, there);
+}
+
+/// The tool of `fit`, and zeros that it makes up for.
+void Examination::tell_tool_beside(const ZerosFit& fit, const CheckRows& there) {
+  const auto& columns = effects_.tool_columns();
+  const auto count = static_cast<Index>(columns.size());
+  const std::vector<Index> zeros(fit.columns.begin(), fit.columns.end() - count);
+  const Estimate found{fit.at(columns), fit.covariance.bottomRightCorner(count, count)};
+  const auto& causes = effects_.causes();
+  const auto tool = std::find_if(causes.begin(), causes.end(),
+                                 [&](const CauseEffects::Entry& entry) { return entry.columns == columns; });
+  SeenChange change;
+  change.cause = tool->cause;
+  change.p_value = check_.p_value;
+  const RefittedRows beside_base(rows_.covariance, frames_of(there));
+  set_size(size_of(found, working_.left_square(columns)), found,
+           square_here(there.by_cause(Eigen::all, columns), beside_base), change);
+  tell_rivals_beside(there, joined(frames_of(there), there.by_cause(Eigen::all, zeros)),
+                     static_cast<std::size_t>(tool - causes.begin()), change);
+  const RefittedRows beside_all(rows_.covariance, joined(frames_of(there), there.by_cause(Eigen::all, fit.columns)));
+  for (const Hypothesis& one : questions_.hypotheses) {
+    const CauseEffects::Entry& entry = causes[one.cause];
+    const bool is_named = std::find(fit.zeros.begin(), fit.zeros.end(), one.cause) != fit.zeros.end();
+    if (one.pose >= 0 || is_named || !is_zero(entry.cause)) continue;
+    const Eigen::MatrixXd own = there.by_cause.col(entry.columns.front());
+    if (beside_all.left(own).norm() < kMadeUpFor * beside_base.left(own).norm()) add_rival(entry.cause, change);
+  }
+  check_.changed.push_back(std::move(change));
+}
+
+void Examination::tell_other_sets(const ZerosFit& fit, SeenChange& change) const {
+  const double whole = 0;  // of all alike
+  for (const ZerosFit& other : fits_) {
+    const bool is_more = std::includes(other.zeros.begin(), other.zeros.end(), fit.zeros.begin(), fit.zeros.end()) &&
+                         (other.tool || !fit.tool);
+    const double ahead = score_of(other, whole) - score_of(fit, whole);
+    const bool as_likely = ahead > (is_more ? 0 : -kAlike);
+    const bool as_much = !is_more && other.zeros.size() <= fit.zeros.size() && other.left < fit.left + kAlike;
+    if (!as_likely && !as_much) continue;
+    for (const std::size_t zero : other.zeros) {
+      const bool is_named = std::find(fit.zeros.begin(), fit.zeros.end(), zero) != fit.zeros.end();
+      if (!is_named) add_rival(effects_.causes()[zero].cause, change);
+    }
+    for (const CauseEffects::Entry& entry : effects_.causes())
+      if (other.tool && !fit.tool && entry.columns == effects_.tool_columns()) add_rival(entry.cause, change);
+  }
+}
+
+void Examination::tell_rivals_beside(const CheckRows& there, const Eigen::MatrixXd& others, std::size_t cause,
+                                     SeenChange& change) const {
+  const health::Questions questions{health::cause_hypotheses(effects_, there, signals_), questions_.causes};
+  const CheckTests tests(rows_.covariance, others, questions);
+  const auto own = std::find_if(questions.hypotheses.begin(), questions.hypotheses.end(),
+                                [&](const Hypothesis& one) { return one.cause == cause; });
+  if (own == questions.hypotheses.end()) return;
+  tell_rivals(static_cast<std::size_t>(own - questions.hypotheses.begin()), tests,
+              tests.scores(tests.rows().left(there.residual)), change);
 }
 
 bool Examination::look_once(const CheckTests& tests) {
@@ -210,7 +448,11 @@ bool Examination::look_once(const CheckTests& tests) {
   if (smallest >= limit) return false;
   const double chance = healthy_.chance_of(smallest);
   const std::optional<std::size_t> best = likeliest(tests, left);
-  if (is_far_ && !(best && is_tool(*best))) {
+  const auto is_all_of_it = [&](std::size_t cause) {
+    const RefittedRows without(covariance_, joined(nuisance_, questions_.hypotheses[cause].columns));
+    return distance_of(without) < kFarOff;
+  };
+  if (is_far_ && !(best && is_tool(*best) && is_all_of_it(*best))) {
     is_too_far_ = true;
     return false;
   }
@@ -240,10 +482,18 @@ std::optional<std::size_t> Examination::likeliest(const CheckTests& tests, const
     const auto best = std::max_element(scores.begin(), scores.end());
     const auto hypothesis = static_cast<std::size_t>(best - scores.begin());
     if (*best <= 0) return std::nullopt;
-    if (!is_extrapolated(hypothesis, tests.rows())) return hypothesis;
+    if (!is_extrapolated(hypothesis, tests.rows()) && may_be_named(hypothesis, tests, left)) return hypothesis;
     *best = 0;
   }
   return std::nullopt;
+}
+
+/// What takes any form fits nearly anything in part: it is named where it is all.
+bool Examination::may_be_named(std::size_t hypothesis, const CheckTests& tests, const Eigen::VectorXd& left) const {
+  if (!effects_.causes()[questions_.hypotheses[hypothesis].cause].cause.any_function) return true;
+  const int freedom = tests.rows().freedom() - tests.freedom(hypothesis);
+  const double rest = left.squaredNorm() - (tests.directions()[hypothesis].transpose() * left).squaredNorm();
+  return freedom > 0 && chi_square_tail(rest, freedom) >= healthy_.limit(options_.false_alarm);
 }
 
 CheckTests Examination::beside_others(std::size_t k) const {
@@ -258,9 +508,8 @@ void Examination::refit_named() {
   nuisance_ = always_;
   for (std::size_t k = 0; k < named_.size(); ++k) {
     const Eigen::MatrixXd& columns = questions_.hypotheses[named_[k].hypothesis].columns;
-    Eigen::VectorXd theta;
-    static_cast<void>(size(named_[k].hypothesis, RefittedRows(rows_.covariance, nuisance_), &theta));
-    covariance_.diagonal() += (kUnlinear * columns * theta).cwiseAbs2();
+    const Estimate found = estimated(named_[k].hypothesis, RefittedRows(rows_.covariance, nuisance_));
+    covariance_.diagonal() += (kUnlinear * columns * found.numbers).cwiseAbs2();
     nuisance_ = joined(nuisance_, columns);
   }
 }
@@ -298,25 +547,52 @@ bool Examination::is_tool(std::size_t hypothesis) const {
   return effects_.causes()[questions_.hypotheses[hypothesis].cause].columns == effects_.tool_columns();
 }
 
-Size Examination::size(std::size_t hypothesis, const RefittedRows& refitted, Eigen::VectorXd* theta) const {
+Estimate Examination::estimated(std::size_t hypothesis, const RefittedRows& refitted) const {
   const Hypothesis& one = questions_.hypotheses[hypothesis];
-  const CauseEffects::Entry& entry = effects_.causes()[one.cause];
-  const Eigen::VectorXd left = refitted.left(rows_.residual);
-  const Eigen::MatrixXd own = refitted.left(one.columns);
-  return entry.cause.any_function ? size_of_any(own, left, working_.any_function_rms(entry.columns.front()), theta)
-                                  : size_of(own, left, working_.left_square(entry.columns), theta);
+  const SingleCause& cause = effects_.causes()[one.cause].cause;
+  const double widest = cause.any_function ? health::kWidestFunction
+                        : is_zero(cause)   ? health::kWidestZero
+                                           : health::kWidest;
+  return health::estimate(refitted.left(one.columns), refitted.left(rows_.residual), widest);
+}
+
+Size Examination::size(std::size_t hypothesis, const Estimate& found) const {
+  const CauseEffects::Entry& entry = effects_.causes()[questions_.hypotheses[hypothesis].cause];
+  return entry.cause.any_function ? size_of_any(found, working_.any_function_rms(entry.columns.front()))
+                                  : size_of(found, working_.left_square(entry.columns));
+}
+
+Eigen::MatrixXd Examination::square_here(const Eigen::MatrixXd& columns, const RefittedRows& refitted) const {
+  const Eigen::MatrixXd all = refitted.unwhitened(refitted.left(columns));
+  Eigen::MatrixXd square = Eigen::MatrixXd::Zero(columns.cols(), columns.cols());
+  for (const Index first : rows_.first) square += all.middleRows<3>(first).transpose() * all.middleRows<3>(first);
+  return square / static_cast<double>(rows_.poses());
+}
+
+void Examination::set_size(const Size& over, const Estimate& found, const Eigen::MatrixXd& here,
+                           SeenChange& change) const {
+  change.at_these_poses = over.rms > off_;
+  const Size told = change.at_these_poses ? size_of(found, here) : over;
+  change.effect_rms = std::min(told.rms, off_);
+  change.u95 = told.u95;
 }
 
 bool Examination::is_extrapolated(std::size_t hypothesis, const RefittedRows& refitted) const {
-  Eigen::VectorXd theta;
-  return size(hypothesis, refitted, &theta).rms > kExtrapolated * off_;
+  return size(hypothesis, estimated(hypothesis, refitted)).rms > kExtrapolated * off_;
 }
 
 void Examination::tell_change(const Named& named, const CheckTests& tests) {
-  Eigen::VectorXd theta;
-  const Size sized = size(named.hypothesis, tests.rows(), &theta);
-  const CauseEffects::Entry& entry = effects_.causes()[questions_.hypotheses[named.hypothesis].cause];
-  SeenChange change{entry.cause, sized.rms, sized.u95, named.chance, {}};
+  const Estimate found = estimated(named.hypothesis, tests.rows());
+  const Hypothesis& one = questions_.hypotheses[named.hypothesis];
+  const CauseEffects::Entry& entry = effects_.causes()[one.cause];
+  SeenChange change;
+  change.cause = entry.cause;
+  change.p_value = named.chance;
+  set_size(size(named.hypothesis, found), found, square_here(one.columns, tests.rows()), change);
+  const double scale = effects_.scale(entry.columns.front());
+  if (std::find(zeros_.causes().begin(), zeros_.causes().end(), one.cause) != zeros_.causes().end())
+    change.zeros.push_back(
+        {entry.cause.joint, scale * found.numbers(0), 2 * scale * std::sqrt(found.covariance(0, 0))});
   tell_rivals(named.hypothesis, tests, tests.scores(tests.rows().left(rows_.residual)), change);
   check_.changed.push_back(std::move(change));
 }
@@ -343,30 +619,26 @@ std::vector<bool> Examination::credible(const std::vector<double>& scores) const
 void Examination::tell_rivals(std::size_t hypothesis, const CheckTests& tests, const std::vector<double>& scores,
                               SeenChange& change) const {
   // What a cause explains whatever it costs: one with more numbers may be the true one all the same.
-  const double price = std::log(static_cast<double>(rows_.residual.size()));
-  const auto explained = [&](std::size_t h) { return scores[h] + price * tests.freedom(h); };
-  const auto add = [&](const SingleCause& other) {
-    const auto same = [&](const SingleCause& known) { return same_cause(known, other); };
-    const bool known = std::any_of(change.could_also_be.begin(), change.could_also_be.end(), same);
-    if (!known && !same(change.cause)) change.could_also_be.push_back(other);
-  };
+  const auto explained = [&](std::size_t h) { return scores[h] + price(tests.freedom(h)); };
   const std::vector<bool> likely = credible(scores);
   for (std::size_t h = 0; h < questions_.causes; ++h) {
     const SingleCause& other = effects_.causes()[questions_.hypotheses[h].cause].cause;
     const bool as_much = !other.any_function && explained(h) > explained(hypothesis) - kAlike;
-    if (as_much || likely[h] || scores[h] > scores[hypothesis] - kAlike) add(other);
+    if (h != hypothesis && (as_much || likely[h] || scores[h] > scores[hypothesis] - kAlike)) add_rival(other, change);
   }
   if (!change.cause.any_function) return;
   for (const causes::Rival& rival : change.cause.record->rivals) {
     const CauseRecord* record = find_cause(rival.cause);
-    if (record != nullptr && record->scope == causes::Scope::kJoint) add({record, change.cause.joint, {}, false});
+    if (record != nullptr && record->scope == causes::Scope::kJoint)
+      add_rival({record, change.cause.joint, {}, false}, change);
   }
 }
 
 void Examination::unknown_found(double chance, const Eigen::VectorXd& left, int freedom) {
   SeenChange change;
-  change.cause.record = &cause_that_stands_for(causes::StandsFor::kNoKnownCause);
+  change.cause = unknown_cause();
   change.p_value = chance;
+  change.at_these_poses = true;
   double noise = 0;  // m, of one axis
   for (std::size_t i = 0; i < rows_.poses(); ++i) noise += covariance_.diagonal().segment<3>(rows_.first[i]).sum();
   noise = noise / static_cast<double>(rows_.poses());
@@ -452,6 +724,13 @@ void Examination::tell_due(const RefittedRows& refitted, const CheckTimes& times
   seen.push_back(*check_.drift);
   check_.drift_rate = drift_rate(seen);
   const DriftRate& rate = *check_.drift_rate;
+  if (rate.checks < kFewestChecks) {
+    check_.due_because = fmt::format(
+        "{}; a date needs {} checks of different days, so far there {} {}: until then check at the usual interval",
+        because_of(rate, static_cast<double>(*times.check - *times.model)), kFewestChecks,
+        rate.checks > 1 ? "are" : "is", rate.checks);
+    return;
+  }
   constexpr double kFarthest = 2 * 365.25 * kDay;
   const double until = (options_.tolerance * options_.tolerance) / (4 * rate.most);
   const double since = static_cast<double>(*times.check - *times.model);
@@ -490,9 +769,10 @@ void Examination::tell_smallest(const CheckTests& tests) {
 std::string Examination::seen_in_words() const {
   std::string text;
   for (const SeenChange& change : check_.changed) {
-    text += fmt::format("{}{}: {:.3f} +- {:.3f} mm rms over the working poses", text.empty() ? "" : "; ",
-                        in_words(change.cause), to_mm(change.effect_rms), to_mm(change.u95));
-    for (const SingleCause& other : change.could_also_be) text += ", or " + in_words(other);
+    text += fmt::format("{}{}: {:.3f} +- {:.3f} mm rms {}", text.empty() ? "" : "; ", change_in_words(change),
+                        to_mm(change.effect_rms), to_mm(change.u95),
+                        change.at_these_poses ? "at these poses" : "over the working poses");
+    for (const SingleCause& other : change.could_also_be) text += ", or " + rival_in_words(other);
   }
   return text;
 }
@@ -585,7 +865,7 @@ Result<HealthCheck> check_health(const CompensatedModel& model, const CheckedBat
   if (!rows) return too_few(known, options, "these poses do not say where the base stands: " + rows.error().message);
   const ErrorFigures& shown = model.parts().training.compensated;
   const int tails = health::tail_freedom_of(shown.rms > 0 ? shown.p997 / shown.rms : 0, model.parts().training.poses);
-  HealthCheck check = Examination(options, effects, working, std::move(*rows), tails)
+  HealthCheck check = Examination(options, effects, working, std::move(*rows), tails, model.cell().robot)
                           .result({model.provenance().measured_at, batch.rows().measured_at});
   check.model = model.provenance().id;
   return check;

@@ -35,12 +35,21 @@ struct HealthOptions {
   std::vector<DriftSeen> earlier = {};  ///< what checks before this one saw of the arm's drift
 };
 
+/// A zero that a joint lost.
+struct LostZero {
+  int joint = 0;   ///< 0-based
+  double by = 0;   ///< rad
+  double u95 = 0;  ///< rad, U(k=2)
+};
+
 /// A change that was seen.
 struct SeenChange {
-  SingleCause cause;      ///< `unknown`: no single cause fits
-  double effect_rms = 0;  ///< m, over the working poses, base (and tool) refitted
-  double u95 = 0;         ///< m, U(k=2) of it
-  double p_value = 1;     ///< chance that the best of all causes explains as much in a healthy robot
+  SingleCause cause;              ///< `unknown`: no single cause fits; a lost zero of no joint: those of several
+  double effect_rms = 0;          ///< m, base (and tool) refitted, over the working poses
+  double u95 = 0;                 ///< m, U(k=2) of it
+  bool at_these_poses = false;    ///< `effect_rms` is at the check's: they do not show how large it is elsewhere
+  std::vector<LostZero> zeros{};  ///< of lost zeros: which, and by how much
+  double p_value = 1;             ///< chance that the best of all causes explains as much in a healthy robot
   std::vector<SingleCause> could_also_be = {};
 };
 
@@ -67,13 +76,17 @@ struct HealthCheck {
 /// Holds `batch` against `model`. The tracker may stand anywhere: the base is found anew. Poses whose tool or payload
 /// the model was not trained with do not count; a batch that has no other is refused.
 /// So is one of several set-ups, and one that was not read as it was meant (reading_doubt()). Where the poses are off
-/// by more than 5 mm only a tool that sits elsewhere is named; else nothing can be told.
+/// by more than 5 mm only lost zeros and a tool that sits elsewhere are named; else nothing can be told.
 ///
 /// The residuals of all poses are r = B b (+ T t) + J theta + e with e ~ N(0, S): S has the measurement's noise, what
 /// the parameters leave uncertain, and what the model leaves over, which poses near each other share; it is scaled so
 /// that the model's own held-out poses have the size that they had. Each single cause is tested beside base (and tool),
 /// and everything together. The limit on their p-values is the one that the smallest of them stays above in
 /// 1 - `false_alarm` of simulated healthy checks at these very poses.
+///
+/// What is beyond it is looked for among zeros that several joints lost at once first, with or without a tool that
+/// sits elsewhere; then among single causes, one after the other. An error of any form over a joint's angle is named
+/// only where it leaves nothing beyond chance. What explains as much as what is named stands beside it.
 [[nodiscard]] Result<HealthCheck> check_health(const CompensatedModel& model, const CheckedBatch& batch,
                                                const HealthOptions& options);
 

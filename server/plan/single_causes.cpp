@@ -195,29 +195,36 @@ void CauseEffects::find_places() {
   }
 }
 
-Eigen::MatrixXd CauseEffects::jacobian_at(const PoseContext& context, Pose* X_WT) const {
+Eigen::MatrixXd CauseEffects::jacobian_at(const PoseContext& context, const Eigen::VectorXd& values, Pose* X_WT) const {
   Eigen::MatrixXd jacobian;
-  *X_WT = model_.pose_W(context, model_.values, &jacobian);
+  *X_WT = model_.pose_W(context, values, &jacobian);
   return jacobian(Eigen::all, place_);
 }
 
-PoseEffects CauseEffects::at(const PoseContext& context) const {
+PoseEffects CauseEffects::at(const PoseContext& context) const { return at(context, Eigen::VectorXd::Zero(size())); }
+
+PoseEffects CauseEffects::at(const PoseContext& context, const Eigen::VectorXd& numbers) const {
+  Eigen::VectorXd values = model_.values;
+  for (std::size_t k = 0; k < place_.size(); ++k) {  // two causes may have one place
+    const auto column = static_cast<Index>(k);
+    values(place_[k]) += numbers(column) * scale_(column);
+  }
   Pose X_WT = Pose::Identity();
-  Eigen::MatrixXd jacobian = jacobian_at(context, &X_WT);
+  Eigen::MatrixXd jacobian = jacobian_at(context, values, &X_WT);
   if (learned_at_ && !warm_.empty()) {
     PoseContext learned = context;
     learned.temperature = learned_at_;
     Pose unused = Pose::Identity();
-    jacobian(Eigen::all, warm_) -= jacobian_at(learned, &unused)(Eigen::all, warm_);
+    jacobian(Eigen::all, warm_) -= jacobian_at(learned, values, &unused)(Eigen::all, warm_);
   }
   const Matrix3 R_BW = model_.X_WB.linear().transpose();
-  const Vector3 p_B = model_.X_WB.inverse() * X_WT.translation();
   PoseEffects effects;
+  effects.X_BT = model_.X_WB.inverse() * X_WT;
   effects.by_cause.resize(6, size());
   effects.by_cause.topRows<3>() = R_BW * jacobian.topRows<3>();
   effects.by_cause.bottomRows<3>() = R_BW * jacobian.bottomRows<3>();
   effects.by_cause *= scale_.asDiagonal();
-  effects.by_base << Matrix3::Identity(), -skew(p_B), Matrix3::Zero(), Matrix3::Identity();
+  effects.by_base << Matrix3::Identity(), -skew(effects.X_BT.translation()), Matrix3::Zero(), Matrix3::Identity();
   return effects;
 }
 

@@ -31,6 +31,7 @@ struct CauseNotAsked {
 
 /// At one pose, all in B: m and rad of the tool.
 struct PoseEffects {
+  Pose X_BT = Pose::Identity();         ///< by the model's physics
   Eigen::MatrixXd by_cause;             ///< 6 x K, by each number of the causes, in units of its prior scale
   Eigen::Matrix<double, 6, 6> by_base;  ///< by a motion of the base
 };
@@ -53,8 +54,12 @@ class CauseEffects {
   [[nodiscard]] const std::vector<Eigen::Index>& tool_columns() const { return tool_; }
   /// Number of columns, K.
   [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(numbers_.size()); }
+  /// Of each column, SI.
+  [[nodiscard]] double scale(Eigen::Index column) const { return scale_(column); }
   /// At the values of the model.
   [[nodiscard]] PoseEffects at(const PoseContext& context) const;
+  /// Where the causes have these numbers (K, in units of their prior scales).
+  [[nodiscard]] PoseEffects at(const PoseContext& context, const Eigen::VectorXd& numbers) const;
 
  private:
   /// One number of a source, which gets a column.
@@ -68,7 +73,8 @@ class CauseEffects {
   /// The source of that cause in the model, which gets it where it has none; null where the cell cannot have it.
   [[nodiscard]] ErrorSourcePtr source_of(const CauseRecord& record, int joint);
   void find_places();
-  [[nodiscard]] Eigen::MatrixXd jacobian_at(const PoseContext& context, Pose* X_WT) const;
+  [[nodiscard]] Eigen::MatrixXd jacobian_at(const PoseContext& context, const Eigen::VectorXd& values,
+                                            Pose* X_WT) const;
 
   PhysicalModel model_;
   std::optional<double> learned_at_;

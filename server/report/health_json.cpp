@@ -27,6 +27,12 @@ ordered_json change_json(const SeenChange& change, const CheckedSince& since) {
   ordered_json json = cause_json(change.cause);
   json["effect_rms_mm"] = to_mm(change.effect_rms);
   json["u95"] = to_mm(change.u95);
+  json["effect_over"] = change.at_these_poses ? "these_poses" : "working_poses";
+  if (!change.zeros.empty()) {
+    json["zeros"] = ordered_json::array();
+    for (const LostZero& zero : change.zeros)
+      json["zeros"].push_back({{"joint", zero.joint + 1}, {"deg", to_deg(zero.by)}, {"u95_deg", to_deg(zero.u95)}});
+  }
   json["p_value"] = change.p_value;
   json["since"] = {{"session_id", since.session_id}, {"pose_id", since.pose_id}};
   json["could_also_be"] = ordered_json::array();

@@ -38,6 +38,20 @@ std::string cause_of(const json& one) {
   return in_words(spelling) + (parameter.empty() ? "" : ", " + parameter);
 }
 
+/// `link geometry, d6`; of zeros which, and by how much.
+std::string change_of(const json& one) {
+  std::vector<std::string> zeros;
+  for (const json& zero : list_in(one, "zeros")) {
+    if (zero.is_object() && zero.contains("joint") && zero.contains("deg") && zero.contains("u95_deg") &&
+        zero["joint"].is_number_integer() && zero["deg"].is_number() && zero["u95_deg"].is_number())
+      zeros.push_back(fmt::format("joint {} by {:.3f} ± {:.3f} deg", zero["joint"].get<int>(),
+                                  zero["deg"].get<double>(), zero["u95_deg"].get<double>()));
+  }
+  if (zeros.empty()) return cause_of(one);
+  return fmt::format("{} ({})", zeros.size() > 1 ? "zeros of several joints: was it remastered?" : cause_of(one),
+                     fmt::join(zeros, ", "));
+}
+
 std::string figures(const json& found) {
   std::vector<HtmlRow> rows;
   const auto add = [&](const char* name, const std::string& value) { rows.push_back({{name, html_text(value)}}); };
@@ -57,8 +71,9 @@ std::string changes(const json& found) {
   for (const json& one : list_in(found, "changed")) {
     std::vector<std::string> others;
     for (const json& other : list_in(one, "could_also_be")) others.push_back(cause_of(other));
-    rows.push_back({{html_text(cause_of(one)), mm_in(one, "effect_rms_mm"), mm_in(one, "u95"),
-                     html_text(fmt::format("{}", fmt::join(others, ", ")))}});
+    const bool here = text_in(one, "effect_over") == "these_poses";
+    rows.push_back({{html_text(change_of(one)), mm_in(one, "effect_rms_mm") + (here ? " at these poses" : ""),
+                     mm_in(one, "u95"), html_text(fmt::format("{}", fmt::join(others, ", ")))}});
   }
   return rows.empty() ? "<p>Nothing that these poses show.</p>"
                       : html_table({"stacks", {"what changed", "effect, rms", "U (k = 2)", "could also be"}, rows});

@@ -447,7 +447,7 @@ Status Trainer::activate(const std::string& cell, int version, const ChangeReque
     const auto made = store_.outcome_of(request.id);
     if (!made) return tl::make_unexpected(made.error());
     if (!*made) {
-      auto verdict = judged_import(cell, version);
+      auto verdict = judged_beside_present(cell, version);
       if (!verdict && !force) return tl::make_unexpected(verdict.error());
       if (verdict) judged = std::move(*verdict);
     }
@@ -457,16 +457,14 @@ Status Trainer::activate(const std::string& cell, int version, const ChangeReque
   return history_.activate(cell, version, request, judged);
 }
 
-Result<std::optional<GateVerdict>> Trainer::judged_import(const std::string& cell_name, int version) const {
+Result<std::optional<GateVerdict>> Trainer::judged_beside_present(const std::string& cell_name, int version) const {
   const std::optional<GateVerdict> nothing_to_judge;
   const auto cell = find_cell(cells(), cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   const auto present = registry_.in_force(cell_name);
-  const auto judged_here = store_.was_made_by_job(cell_name, version);
-  if (!judged_here) return tl::make_unexpected(judged_here.error());
-  if (*judged_here || !present || present->version == version) return nothing_to_judge;
-  const auto imported = registry_.version(cell_name, version);
-  if (!imported) return tl::make_unexpected(imported.error());
+  if (!present || present->version == version) return nothing_to_judge;
+  const auto asked = registry_.version(cell_name, version);
+  if (!asked) return tl::make_unexpected(asked.error());
   StoredJob nothing;
   nothing.cell = cell_name;
   const auto sources = batch_sources(store_, nothing, true);
@@ -478,18 +476,25 @@ Result<std::optional<GateVerdict>> Trainer::judged_import(const std::string& cel
     if (!stored) return tl::make_unexpected(stored.error());
     batches.add({source.id, stored->csv, stored->accepted_at}, true);
   }
-  return std::optional(verdict_on((*imported)->model, present.get(), {}, {}, batches.judging_sessions(),
-                                  {Bar::kBetter, options_.accept_ratio}));
+  GateVerdict verdict = verdict_on((*asked)->model, present.get(), {}, {}, batches.judging_sessions(),
+                                   {Bar::kBetter, options_.accept_ratio});
+  verdict.why +=
+      fmt::format(" (judged by what {} batches hold out, the newest is {})", sources->size(), sources->back().id);
+  return std::optional(std::move(verdict));
 }
 
 Status Trainer::check_not_worse(const std::string& cell, int version, const GateVerdict& verdict) const {
   const GateFigures& figures = verdict.figures;
   const bool has_figures = figures.before && figures.after;
   if (verdict.put_in_force || (has_figures && *figures.after <= options_.accept_ratio * *figures.before)) return {};
-  const int present = registry_.version_in_force(cell);
+  const auto made_here = store_.was_made_by_job(cell, version);
+  if (!made_here) return tl::make_unexpected(made_here.error());
+  // The job that made it has said already that it could not be judged: whoever asks for it knows.
+  if (*made_here && (verdict.undecided || !has_figures)) return {};
   const char* how = has_figures ? "worse than" : "not known to be as good as";
   Failure worse =
-      refused("cell {}: version {} was imported and is {} version {}: {}", cell, version, how, present, verdict.why)
+      refused("cell {}: version {} is {} version {}, which is in force: {}", cell, version, how,
+              registry_.version_in_force(cell), verdict.why)
           .of(has_figures ? "after_mm" : "version")
           .next(fmt::format("trammel activate --service --model {}@{} --force puts it in force all the same", cell,
                             version));

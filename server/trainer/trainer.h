@@ -112,8 +112,9 @@ class Trainer {
   /// See ModelHistory.
   /// Tell it what the cells are asked for.
   [[nodiscard]] RecentPoses& recent_poses() { return history_.recent_poses(); }
-  /// See ModelHistory. A version that was imported is judged first, as a new one would be: where it is worse on the
-  /// same poses than the one in force it is refused with the figures, unless `force` says that it is wanted.
+  /// See ModelHistory. Any version is judged first, as a new one would be: where it is worse on the same poses than the
+  /// one in force it is refused with the figures, unless `force` says that it is wanted. So is an imported one that
+  /// cannot be judged.
   [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeRequest& request = {},
                                 bool force = false);
   [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeRequest& request = {}) {
@@ -180,9 +181,8 @@ class Trainer {
   [[nodiscard]] Result<bool> was_asked_for(const StoredJob& job) const;
   /// Whether an unfinished job of the store is to be worked on; else a notice says why not.
   [[nodiscard]] Result<bool> can_take_up(const StoredJob& job, std::vector<std::string>& notices);
-  /// An imported version held against the one in force on what the cell measured; empty: a job made it here, or there
-  /// is nothing to hold it against.
-  [[nodiscard]] Result<std::optional<GateVerdict>> judged_import(const std::string& cell, int version) const;
+  /// A version held against the one in force on what the cell measured; empty: there is nothing to hold it against.
+  [[nodiscard]] Result<std::optional<GateVerdict>> judged_beside_present(const std::string& cell, int version) const;
   /// Refuses what the verdict finds worse, or not to be told.
   [[nodiscard]] Status check_not_worse(const std::string& cell, int version, const GateVerdict& verdict) const;
   /// Whether the stored batches may be trained from together.

@@ -1,6 +1,6 @@
 // What a check of a few planned poses sees. Robots of the second simulation, trained from their files; --robots of each
 // kind. False alarms of healthy robots; changes of a single cause of 50 um rms (base refitted, tool in turn); the size
-// at which 95 % are seen beside the size that the check states.
+// at which 95 % are seen beside the size that the check states. Robots whose joints lost several zeros.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -10,6 +10,7 @@
 #include "server/base/units.h"
 #include "tests/support/checked_robot.h"
 #include "tests/support/figure.h"
+#include "tests/support/remastered.h"
 
 namespace trammel {
 namespace {
@@ -160,6 +161,36 @@ void sizes(const CheckedRobot& robot, int each) {
   test::tell_figure("health: stated smallest effect off by at most, %", 100 * farthest);
 }
 
+/// A quarter each by 6, 8, 12 and 20 poses: planned, and every second time as the training had them.
+void remastered(int worlds) {
+  int named = 0, whole = 0, sure_and_wrong = 0;
+  for (const bool orientation : {true, false}) {
+    for (const int poses : {6, 8, 12, 20}) {
+      const CheckedRobot planned = test::trained_robot({.seed = 11, .poses = 150, .orientation = orientation}, poses);
+      hidden::Random random(static_cast<std::uint64_t>(poses));
+      for (int k = 0; k < worlds / 8; ++k) {
+        CheckedRobot robot = planned;
+        for (std::size_t i = 0; k % 2 == 1 && i < robot.planned.size(); ++i)
+          robot.planned[i] = robot.robot.world.poses[(static_cast<std::size_t>(k) * 7 + i) % 150].q;
+        const test::Remastered world = test::draw_remastered(robot, random);
+        const HealthCheck check = checked(robot, {world.effects}, random(), {});
+        const bool right = test::is_right(check, world);
+        named += right ? 1 : 0;
+        whole += right && test::joints_of(check.changed.front().zeros) == world.joints ? 1 : 0;
+        if (right || !test::is_sure(check)) continue;
+        ++sure_and_wrong;
+        fmt::print("  joints {}{}, {} poses: {}\n", fmt::join(world.joints, " "), world.tool ? ", tool" : "", poses,
+                   check.sentence);
+      }
+      fmt::print("lost zeros, {} poses{}: so far {} named, {} of them all, {} sure and wrong\n", poses,
+                 orientation ? "" : ", positions", named, whole, sure_and_wrong);
+      std::cout.flush();
+    }
+  }
+  test::tell_figure("health: lost zeros named, %", 100.0 * named / (worlds / 8 * 8));
+  test::tell_figure("health: lost zeros sure and wrong", sure_and_wrong);
+}
+
 void run(const Options& options, int size_trials) {
   Seen all_healthy, all_changed;
   for (Kind kind : kinds()) {
@@ -197,11 +228,13 @@ void run(const Options& options, int size_trials) {
 int main(int argc, char** argv) {
   CLI::App app("What a health check sees");
   trammel::Options options;
-  int size_trials = 100;
+  int size_trials = 100, zeros = 200;
   app.add_option("--robots", options.robots, "of each kind");
   app.add_option("--healthy", options.healthy, "checks of each healthy robot");
   app.add_option("--each", options.each, "changes of each cause and robot");
   app.add_option("--size-trials", size_trials, "at each of five sizes; 0: the stated size is not measured");
+  app.add_option("--zeros", zeros, "worlds of several lost zeros; 0: none");
   CLI11_PARSE(app, argc, argv);
-  trammel::run(options, size_trials);
+  if (options.robots > 0) trammel::run(options, size_trials);
+  if (zeros > 0) trammel::remastered(zeros);
 }

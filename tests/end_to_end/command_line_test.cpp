@@ -834,8 +834,11 @@ TEST_F(CommandLineWithService, VersionsAreRetrainedActivatedRolledBackAndImporte
   for (const char* part : {"version 2, not in force", "held-out rms", "trammel activate --service --model cell-7@2"}) {
     EXPECT_NE(worse.out.find(part), std::string::npos) << part << " is not in:\n" << worse.out;
   }
-  const Finished activated = must_answer({"activate", "--model", "cell-7@2"});
-  for (const char* part : {"version 2 in force", "held-out rms: before", "why: when it was made",
+  const Finished refused = ask({"activate", "--model", "cell-7@2"});
+  EXPECT_EQ(refused.exit_code, kRefusedData);
+  EXPECT_NE(refused.err.find("is worse than version 1, which is in force"), std::string::npos) << refused.err;
+  const Finished activated = must_answer({"activate", "--model", "cell-7@2", "--force"});
+  for (const char* part : {"version 2 in force", "held-out rms: before", "the newest is lt-01",
                            "next: trammel rollback --service --cell cell-7 puts version 1"}) {
     EXPECT_NE(activated.out.find(part), std::string::npos) << part << " is not in:\n" << activated.out;
   }

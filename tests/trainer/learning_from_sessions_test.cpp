@@ -79,6 +79,26 @@ TEST(LearningFromSessions, AnImportedModelThatIsWorseIsPutInForceByForceOnly) {
   EXPECT_EQ(learning.in_force(), version);
 }
 
+TEST(LearningFromSessions, AnOlderVersionThatIsWorseThanTheOneInForceIsPutInForceByForceOnly) {
+  const auto cell = cell_of();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  LearningCell learning(cell);
+  learning.submit(measured_on(robot, {.poses = 60, .seed = 1, .noise = 6}));
+  const JobProgress newer = learning.submit(measured_on(robot, {.poses = 300, .seed = 2}));
+  ASSERT_TRUE(newer.in_force) << newer.what;
+  const Status refused = learning.trainer().activate("cell-7", 1);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().field, "after_mm");
+  ASSERT_TRUE(refused.error().value && refused.error().limit) << "the figures as data";
+  EXPECT_GT(*refused.error().value, *refused.error().limit);
+  for (const char* part : {"worse than version 2, which is in force", "the newest is day-2"})
+    EXPECT_NE(refused.error().message.find(part), std::string::npos) << refused.error().message;
+  EXPECT_EQ(learning.in_force(), 2);
+  ASSERT_TRUE(learning.trainer().activate("cell-7", 1, {}, true));
+  EXPECT_EQ(learning.in_force(), 1);
+  EXPECT_TRUE(learning.trainer().activate("cell-7", 2)) << "back to the better one needs no force";
+}
+
 TEST(LearningFromSessions, AnImportedModelThatIsBetterNeedsNoForce) {
   const auto cell = cell_of();
   const VirtualRobot robot = test::chapter_5_robot(cell);

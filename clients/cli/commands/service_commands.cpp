@@ -362,7 +362,7 @@ void add_model_changes(ServiceCommands& commands) {
       [](CLI::App& command, ServiceArguments& arguments) {
         command.add_option("--model", arguments.model, "CELL@VERSION, as the command models lists them")->required();
         command.add_flag("--force", arguments.force,
-                         "Even if it was imported and is worse than the version in force on the poses held out");
+                         "Even if it is worse than the version in force on the poses held out");
         add_reason(command, arguments);
       });
   commands.add("rollback", "Put back in force the model that was before", rollback,

@@ -17,6 +17,7 @@ constexpr double kOfJoints =
     0.5;  // of the variance that a model leaves over: as errors of joints, the rest in any direction
 constexpr double kFarOff = 6;      // times the median: a pose that does not say where the base stands
 constexpr int kLocalisations = 4;  // without the poses that were far off the last time
+constexpr double kThin = 0.02;     // of how far the poses are away: within less of a line they turn the base anyhow
 constexpr double kJitter = 1e-6;   // of the instrument's variance: what is certain is so to rounding
 
 double median(std::vector<double> values) {
@@ -50,6 +51,42 @@ Result<Pose> located(const MeasurementBatch& batch, const std::vector<ErrorPredi
     if (used.size() == n) break;
   }
   return X_WB;
+}
+
+/// Whether all poses are at about one place, or on one line: an error of theirs turns the base as it likes.
+bool are_thin(const std::vector<ErrorPrediction>& predictions) {
+  Eigen::Matrix3Xd p_B(3, static_cast<Index>(predictions.size()));
+  for (std::size_t i = 0; i < predictions.size(); ++i)
+    p_B.col(static_cast<Index>(i)) = predictions[i].X_BT_predicted.translation();
+  const Vector3 mean = p_B.rowwise().mean();
+  const Eigen::Matrix3Xd apart = p_B.colwise() - mean;
+  const double across = Eigen::JacobiSVD<Eigen::Matrix3Xd>(apart).singularValues()(1);
+  return across < kThin * mean.norm() * std::sqrt(static_cast<double>(predictions.size()));
+}
+
+/// Where the base stands by orientations, and by the mean of the positions.
+Pose turned_by_orientations(const MeasurementBatch& batch, const std::vector<ErrorPrediction>& predictions) {
+  Matrix3 turned = Matrix3::Zero();
+  Vector3 measured_W = Vector3::Zero(), predicted_B = Vector3::Zero();
+  const auto n = static_cast<double>(predictions.size());
+  for (std::size_t i = 0; i < predictions.size(); ++i) {
+    const Pose& X_BT = predictions[i].X_BT_predicted;
+    if (batch.measurements[i].R_WT) turned += *batch.measurements[i].R_WT * X_BT.linear().transpose();
+    measured_W += batch.measurements[i].p_W / n;
+    predicted_B += X_BT.translation() / n;
+  }
+  const Matrix3 R_WB = nearest_rotation(turned);
+  return make_pose(R_WB, measured_W - R_WB * predicted_B);
+}
+
+Result<Pose> base_of(const MeasurementBatch& batch, const std::vector<ErrorPrediction>& predictions,
+                     bool by_orientations) {
+  constexpr std::size_t kFewest = 3;  // poses
+  if (predictions.size() < kFewest || !are_thin(predictions)) return located(batch, predictions);
+  if (by_orientations) return turned_by_orientations(batch, predictions);
+  return refused(
+      "all of them are at about one place or on one line, so that any error turns the base: measure poses "
+      "that are spread over the workspace (`trammel plan --check`)");
 }
 
 /// Standard deviation of one axis of an orientation that the model shows on its own poses; 0: it knows none.
@@ -172,9 +209,11 @@ Result<CheckRows> check_rows(const CompensatedModel& model, const MeasurementBat
   CheckRows rows;
   rows.contexts = contexts_of(model, batch);
   const std::vector<ErrorPrediction> predictions = model.predict_all(rows.contexts);
-  const Result<Pose> X_WB = located(batch, predictions);
-  if (!X_WB) return tl::make_unexpected(X_WB.error());
   const double shown = rotation_shown(parts);
+  const bool has_orientation = std::any_of(batch.measurements.begin(), batch.measurements.end(),
+                                           [&](const Measurement& m) { return m.R_WT && shown > 0; });
+  const Result<Pose> X_WB = base_of(batch, predictions, has_orientation);
+  if (!X_WB) return tl::make_unexpected(X_WB.error());
   Index next = 0;
   for (const Measurement& m : batch.measurements) {
     rows.pose_ids.push_back(m.pose_id);
@@ -193,6 +232,7 @@ Result<CheckRows> check_rows(const CompensatedModel& model, const MeasurementBat
     const Measurement& m = batch.measurements[i];
     const Index first = rows.first[i];
     const Pose& X_BT = predictions[i].X_BT_predicted;
+    rows.predicted.push_back(X_BT);
     const PoseEffects at = effects.at(rows.contexts[i]);
     Eigen::MatrixXd J_W;
     static_cast<void>(parts.physics.pose_W(rows.contexts[i], parts.physics.values, &J_W));

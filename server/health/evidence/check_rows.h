@@ -15,6 +15,7 @@ struct CheckRows {
   std::vector<PoseContext> contexts;
   std::vector<Eigen::Index> first;  ///< row of each pose
   std::vector<Eigen::Index> count;  ///< 3 or 6
+  std::vector<Pose> predicted;      ///< X_BT
   Eigen::VectorXd residual;         ///< R, m and rad: measured - predicted, with the base where it fits best
   Eigen::MatrixXd covariance;       ///< R x R: what a healthy robot's residuals have
   Eigen::MatrixXd by_base;          ///< R x 6
@@ -26,7 +27,8 @@ struct CheckRows {
 /// How the poses of a request to the model are, beside what is measured there.
 [[nodiscard]] std::vector<PoseContext> contexts_of(const CompensatedModel& model, const MeasurementBatch& batch);
 
-/// `batch` has only rows that the model knows(). Refuses positions that do not say where the base stands.
+/// `batch` has only rows that the model knows(). Refuses positions that do not say where the base stands, or, without
+/// orientations, which way it is turned.
 [[nodiscard]] Result<CheckRows> check_rows(const CompensatedModel& model, const MeasurementBatch& batch,
                                            const CauseEffects& effects);
 

@@ -55,6 +55,13 @@ std::vector<Hypothesis> pose_hypotheses(const CheckRows& rows) {
   return all;
 }
 
+Estimate estimate(const Eigen::MatrixXd& own, const Eigen::VectorXd& left, double widest) {
+  Eigen::MatrixXd information = own.transpose() * own;
+  information.diagonal().array() += 1 / (widest * widest);
+  const Eigen::LLT<Eigen::MatrixXd> factor(information);
+  return {factor.solve(own.transpose() * left), factor.solve(Eigen::MatrixXd::Identity(own.cols(), own.cols()))};
+}
+
 RefittedRows::RefittedRows(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& nuisance) : factor_(covariance) {
   const Eigen::MatrixXd columns = whitened(nuisance);
   nuisance_ = span_of(columns, lengths(columns));
@@ -73,7 +80,7 @@ Eigen::MatrixXd RefittedRows::directions(const Eigen::MatrixXd& columns) const {
   return span_of(left(columns), lengths(whitened(columns)));
 }
 
-Eigen::VectorXd RefittedRows::unwhitened(const Eigen::VectorXd& left) const { return factor_.matrixL() * left; }
+Eigen::MatrixXd RefittedRows::unwhitened(const Eigen::MatrixXd& left) const { return factor_.matrixL() * left; }
 
 Eigen::MatrixXd RefittedRows::unwhitened_covariance() const {
   const Eigen::MatrixXd all =

@@ -11,6 +11,18 @@ namespace trammel::health {
 /// Share of a column: less that is left of it is rounding, or made up for.
 inline constexpr double kLeastLeft = 1e-3;
 
+/// How far numbers of a cause can be off at all, in units of their prior scales (standard deviations): 20 mm and 50
+/// mrad of links and tools, 0.1 rad of a zero, 2 mrad of an error that goes with the angle.
+inline constexpr double kWidest = 10, kWidestZero = 50, kWidestFunction = 1;
+
+/// Numbers fitted to residuals: what these do not tell is not known beyond the prior.
+struct Estimate {
+  Eigen::VectorXd numbers;
+  Eigen::MatrixXd covariance;
+};
+/// `own`: R x k, `left`: R, both whitened and refitted. `widest`: in units of the numbers.
+[[nodiscard]] Estimate estimate(const Eigen::MatrixXd& own, const Eigen::VectorXd& left, double widest);
+
 /// Something that may explain the residuals: columns of R rows.
 struct Hypothesis {
   std::size_t cause = 0;         ///< index in CauseEffects::causes()
@@ -39,8 +51,8 @@ class RefittedRows {
   }
   /// R x r, orthonormal: the directions that columns have left; those that the nuisance makes up for are none.
   [[nodiscard]] Eigen::MatrixXd directions(const Eigen::MatrixXd& columns) const;
-  /// R: residuals as a generalised least-squares fit of the nuisance leaves them, in their own units.
-  [[nodiscard]] Eigen::VectorXd unwhitened(const Eigen::VectorXd& left) const;
+  /// R x k: residuals, or columns, as a generalised least-squares fit of the nuisance leaves them, in their own units.
+  [[nodiscard]] Eigen::MatrixXd unwhitened(const Eigen::MatrixXd& left) const;
   /// R x R: their covariance.
   [[nodiscard]] Eigen::MatrixXd unwhitened_covariance() const;
 

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <vector>
+
+#include "server/health/evidence/check_rows.h"
+
+/// Zeros that several joints lost at once, as in a robot that was mastered anew, and beside them perhaps a tool that
+/// sits elsewhere: one explanation of a check.
+///
+/// A zero that is off by degrees does not act linearly: base, zeros and tool are found together by Gauss and Newton.
+/// Each number has a prior of what it can be at all, which bounds what the poses do not tell.
+namespace trammel::health {
+
+/// What these zeros, and the tool, explain.
+struct ZerosFit {
+  std::vector<std::size_t> zeros;  ///< indices in CauseEffects::causes(), ascending
+  bool tool = false;               ///< sits elsewhere as well
+  int numbers = 0;                 ///< that are free and show at the poses
+  double left = 0;                 ///< whitened square of what they do not explain
+  Pose X_BB = Pose::Identity();    ///< the base, seen from where the rows have it
+
+  std::vector<Eigen::Index> columns;  ///< of the numbers: zeros, then tool
+  Eigen::VectorXd at;                 ///< K, in prior scales; 0 where `columns` are not
+  Eigen::MatrixXd covariance;         ///< of `columns`
+};
+
+class ZerosSearch {
+ public:
+  /// `zeros`: causes that may be among them. `new_tool`: the tool is refitted in any case.
+  ZerosSearch(const CauseEffects& effects, const CheckRows& rows, std::vector<std::size_t> zeros, bool new_tool);
+
+  [[nodiscard]] const std::vector<std::size_t>& causes() const { return zeros_; }
+  /// Each set of zeros, without and with the tool, and the tool alone. Empty of arms with so many joints that they are
+  /// too many.
+  [[nodiscard]] std::vector<ZerosFit> all() const;
+  /// The check's rows, linear around the fit: what its numbers do there included.
+  [[nodiscard]] CheckRows around(const ZerosFit& fit) const;
+
+ private:
+  struct Linear {
+    Eigen::VectorXd residual;
+    Eigen::MatrixXd by_base, by_cause;
+  };
+  [[nodiscard]] Linear linear(const Eigen::VectorXd& at, const Pose& X_BB) const;
+  [[nodiscard]] ZerosFit begun(unsigned chosen, bool tool) const;
+  void fit(ZerosFit& one) const;
+
+  const CauseEffects& effects_;
+  const CheckRows& rows_;
+  const std::vector<std::size_t> zeros_;
+  const bool new_tool_;
+  const Eigen::LLT<Eigen::MatrixXd> factor_;
+  std::vector<Pose> physics_;  // X_BT of the model's physics, at each pose
+  int tool_numbers_ = 0;
+};
+
+}  // namespace trammel::health
