@@ -7,6 +7,7 @@
 #include <set>
 
 #include "clients/cam/stated_robot.h"
+#include "clients/cam/taught.h"
 #include "server/base/units.h"
 
 namespace trammel::cam {
@@ -43,6 +44,7 @@ class Finding {
   void note_tools() {
     found_.notes = program_.notes;
     for (const std::string& note : notes_on_base(program_, cell_)) found_.notes.push_back(note);
+    if (const std::string note = note_on_taught_targets(program_); !note.empty()) found_.notes.push_back(note);
     const auto add = [&](const std::string& note) {
       if (!note.empty() && std::find(found_.notes.begin(), found_.notes.end(), note) == found_.notes.end())
         found_.notes.push_back(note);
