@@ -11,13 +11,13 @@ namespace trammel::cam {
 
 namespace {
 
-constexpr std::size_t kFewest = 4;          // poses that show a habit
-constexpr std::size_t kMost = 500;          // nobody jogs to more
-constexpr double kStep_mm = 0.5;            // of plain coordinates
-constexpr double kSame_mm = 1e-4;           // below any written digit
-constexpr double kSameRotation = 5e-5;      // rad: a jogged wrist comes back to 1e-4 at best
-constexpr double kNearest_mm = 20;          // paths of CAM systems have their points closer together
-constexpr double kShareOfExceptions = 0.1;  // of the poses
+constexpr std::size_t kFewest = 4;      // poses that show a habit
+constexpr std::size_t kMost = 500;      // nobody jogs to more
+constexpr double kStep_mm = 0.5;        // of plain coordinates
+constexpr double kSame_mm = 1e-4;       // below any written digit
+constexpr double kSameRotation = 5e-5;  // rad: a jogged wrist comes back to 1e-4 at best
+constexpr double kNearest_mm = 20;      // paths of CAM systems have their points closer together
+constexpr std::size_t kTenth = 10;      // of the poses, or one, may look drawn by chance
 
 bool is_plain(double mm) { return std::abs(mm - kStep_mm * std::round(mm / kStep_mm)) < kSame_mm; }
 
@@ -58,7 +58,7 @@ std::string note_on_taught_targets(const Program& program) {
   if (poses.size() < kFewest || poses.size() > kMost || usual_step(poses) < kNearest_mm) return "";
   std::size_t drawn = 0;
   for (std::size_t k = 0; k < poses.size(); ++k) drawn += looks_drawn(poses, k) ? 1 : 0;
-  if (static_cast<double>(drawn) > kShareOfExceptions * static_cast<double>(poses.size())) return "";
+  if (drawn > std::max<std::size_t>(1, poses.size() / kTenth)) return "";
   return fmt::format(
       "{} of {} poses look taught: no number of them is round or stands twice. Taught positions hold the robot's "
       "errors "

@@ -220,7 +220,7 @@ class Backup {
     if (known->second.X_FT.isApprox(stated.X_FT, 1e-9)) return {};
     return refused("{}", two_values("tool", tool.name, pose_text(known->second.X_FT), known->second.where,
                                     pose_text(stated.X_FT), stated.where))
-        .of("tool")
+        .of("tooldata")
         .with_text(tool.name);
   }
 

@@ -117,11 +117,11 @@ class Reader {
 
   void collect(std::size_t f) {
     lines_.push_back(krl::lines_of(program_.files[f].text));
-    int open = -1;                      // the routine that the line is in
-    std::optional<std::size_t> spline;  // the head of the block that the line is in
+    int open = -1;  // the routine that the line is in
     MarkPlace mark{program_.files[f].text.starts_with("\xEF\xBB\xBF") ? std::size_t{3} : 0, "; "};
     const std::vector<Line>& lines = lines_[f];
     if (is_controllers_bas(f)) return program_.mark_places.push_back(mark);
+    std::size_t spline = lines.size();  // the head of the block that the line is in; their number: none
     bool any = false;
     for (std::size_t k = 0; k < lines.size(); ++k) {
       note_tool_name(lines[k]);
@@ -129,8 +129,8 @@ class Reader {
       const std::vector<Token>& tokens = lines[k].tokens;
       const std::size_t first = !tokens.empty() && tokens[0].text == "GLOBAL" ? 1 : 0;
       const std::string word = tokens.empty() ? "" : tokens[0].text;
-      if (word == "ENDSPLINE") spline.reset();
-      if (spline) spline_heads_[{f, k}] = *spline;
+      if (word == "ENDSPLINE") spline = lines.size();
+      if (spline < lines.size()) spline_heads_[{f, k}] = spline;
       if (word == "SPLINE" || word == "PTP_SPLINE") spline = k;
       if (tokens.size() > first + 1 &&
           (tokens[first].text == "DEF" || tokens[first].text == "DEFFCT" || tokens[first].text == "DEFDAT")) {

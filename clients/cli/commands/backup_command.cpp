@@ -152,7 +152,7 @@ Result<std::string> parameters_of(const BackupArguments& arguments, const std::s
 
 /// Which modules to take is for whoever asks to say, unless he has.
 Error advised(Error error, const BackupArguments& arguments) {
-  if (error.field == "tool" && error.next.empty())
+  if (error.field == "tooldata" && error.next.empty())
     error.next = arguments.task.empty() ? "--task says of which task they are taken"
                                         : "take the module that is not used out of the backup";
   return error;
