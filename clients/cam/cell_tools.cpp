@@ -26,17 +26,10 @@ bool same_tool(const ProgramTool& tool, const Pose& X_FT) {
          angle(*tool.X_FT, X_FT) <= kToolRotationTolerance + std::min(tool.rotation_rounding, from_deg(0.02));
 }
 
-std::string pose_text(const Pose& X) {
-  const Vector3 p = X.translation() * to_mm(1);
-  const Eigen::Quaterniond q(X.linear());
-  return fmt::format("[{:.3f}, {:.3f}, {:.3f}] mm [{:.6f}, {:.6f}, {:.6f}, {:.6f}]", p.x(), p.y(), p.z(), q.w(), q.x(),
-                     q.y(), q.z());
-}
-
 std::string difference_text(const ProgramTool& tool, const std::string& name, const Pose& X_FT) {
-  return fmt::format("tool {} is {} in the program, {} is {} in the cell: {:.3f} mm and {:.4f} deg apart",
-                     shown(tool.name), pose_text(*tool.X_FT), name, pose_text(X_FT), to_mm(distance(*tool.X_FT, X_FT)),
-                     to_deg(angle(*tool.X_FT, X_FT)));
+  return fmt::format("tool {} is {} in the {}, {} is {} in the cell: {}", shown(tool.name), pose_text(*tool.X_FT),
+                     tool.from_row ? "row of --frames" : "program", name, pose_text(X_FT),
+                     apart_text(*tool.X_FT, X_FT));
 }
 
 bool same_load(const StatedLoad& load, const Payload& payload) {
@@ -93,9 +86,12 @@ class Choosing {
  private:
   void refuse(const ProgramTool& tool, const std::string& what) {
     Error error = refused("{}", what).of("tool " + shown(tool.name)).value();
-    if (!tool.file.empty()) {
+    if (tool.from_row) {
+      error.file = "--frames";
+      error.field = tool.row;
+    } else if (!tool.file.empty()) {
       error.file = tool.file;
-      error.row = tool.line;
+      if (tool.line > 0) error.row = tool.line;
     }
     refusals_.push_back(std::move(error));
   }
@@ -166,6 +162,12 @@ class Choosing {
     if (choice.payload.empty() && stated) find_by_load();
     const auto known = cell_.payloads.find(choice.payload);
     choice.load_note = tool.load_note;
+    if (stated && known == cell_.payloads.end())
+      choice.load_note =
+          fmt::format("load of tool {} is {} in the program, {}: it is not compared", called(tool),
+                      tool.load->has_centre ? load_text(tool.load->mass, tool.load->p_F)
+                                            : fmt::format("{:.3f} kg", tool.load->mass),
+                      cell_.payloads.empty() ? "the cell has no payloads" : "none of the cell's payloads");
     if (!stated || known == cell_.payloads.end() || same_load(*tool.load, known->second)) return;
     const std::string why = load_difference(tool, known->first, known->second);
     // What is carried for a part of the program concerns that part.

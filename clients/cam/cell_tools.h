@@ -14,6 +14,7 @@ namespace trammel::cam {
 struct CellTools {
   std::map<std::string, Pose> tools;  ///< X_FT
   std::map<std::string, Payload> payloads;
+  std::optional<Pose> X_WB = {};  ///< the cell's base, seen from its measuring system; empty: found from the data
 };
 
 struct ToolChoice {

@@ -9,6 +9,7 @@
 #include "clients/cam/inform/inform.h"
 #include "clients/cam/krl/krl.h"
 #include "clients/cam/rapid/rapid.h"
+#include "clients/cam/stated_robot.h"
 #include "clients/cam/tables/tables.h"
 #include "clients/cam/urscript/urscript.h"
 
@@ -22,6 +23,7 @@ struct Entry {
   std::vector<std::string> endings;
   Program (*read)(std::vector<SourceFile>, const ReadOptions&);
   const char* motions;
+  std::vector<const char*> rows;  ///< how the names of its tools and frames begin in --frames
 };
 
 const std::vector<Entry>& entries() {
@@ -30,17 +32,34 @@ const std::vector<Entry>& entries() {
        "rapid",
        {".mod", ".prg", ".sys", ".modx", ".prgx", ".sysx"},
        read_rapid,
-       "MoveJ, MoveL, MoveC or MoveAbsJ in a MODULE"},
-      {Dialect::kFanuc, "fanuc", {".ls"}, read_fanuc, "J, L or C to P[...] with its /POS section"},
-      {Dialect::kKrl, "krl", {".src", ".dat", ".sub"}, read_krl, "PTP, LIN or CIRC, in a DEF, with its .dat file"},
-      {Dialect::kInform, "inform", {".jbi"}, read_inform, "MOVJ, MOVL or MOVC to C00000 under NPOS"},
-      {Dialect::kUrScript, "urscript", {".script"}, read_urscript, "movej, movel, movep or movec"},
-      {Dialect::kCamRob, "camrob", {}, read_camrob, "rows of number;x;y;z;a;b;c, in mm and deg"},
+       "MoveJ, MoveL, MoveC or MoveAbsJ in a MODULE",
+       {""}},
+      {Dialect::kFanuc,
+       "fanuc",
+       {".ls"},
+       read_fanuc,
+       "J, L or C to P[...] with its /POS section",
+       {"UTOOL[", "UFRAME["}},
+      {Dialect::kKrl,
+       "krl",
+       {".src", ".dat", ".sub"},
+       read_krl,
+       "PTP, LIN or CIRC, in a DEF, with its .dat file",
+       {"TOOL_DATA[", "BASE_DATA["}},
+      {Dialect::kInform,
+       "inform",
+       {".jbi"},
+       read_inform,
+       "MOVJ, MOVL or MOVC to C00000 under NPOS",
+       {"TOOL[", "USER["}},
+      {Dialect::kUrScript, "urscript", {".script"}, read_urscript, "movej, movel, movep or movec", {"TCP"}},
+      {Dialect::kCamRob, "camrob", {}, read_camrob, "rows of number;x;y;z;a;b;c, in mm and deg", {"CAMROB"}},
       {Dialect::kRoboDk,
        "robodk",
        {},
        read_robodk,
-       "rows of name,x,y,z and rx,ry,rz (deg) or qw,qx,qy,qz, or a header that names them"},
+       "rows of name,x,y,z and rx,ry,rz (deg) or qw,qx,qy,qz, or a header that names them",
+       {"ROBODK"}},
   };
   return kEntries;
 }
@@ -80,6 +99,15 @@ const char* motions_of(Dialect dialect) {
   return "";
 }
 
+bool may_have_row(Dialect dialect, const std::string& name) {
+  for (const Entry& entry : entries()) {
+    if (entry.dialect != dialect) continue;
+    return name == kRobotBase || std::any_of(entry.rows.begin(), entry.rows.end(),
+                                             [&](const char* beginning) { return name.starts_with(beginning); });
+  }
+  return false;
+}
+
 std::string dialect_names() {
   std::vector<std::string> names;
   for (const Entry& entry : entries()) names.emplace_back(entry.name);
@@ -90,6 +118,7 @@ Program read_program(Dialect dialect, std::vector<SourceFile> files, const ReadO
   for (const Entry& entry : entries()) {
     if (entry.dialect != dialect) continue;
     Program program = entry.read(std::move(files), options);
+    stand_in_world(program, options);
     leave_targets_in(program, options.spared);
     leave_halves_of_arcs(program);
     return program;

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <set>
 
+#include "clients/cam/stated_robot.h"
+#include "clients/cam/taught.h"
 #include "server/base/units.h"
 
 namespace trammel::cam {
@@ -41,6 +43,8 @@ class Finding {
  private:
   void note_tools() {
     found_.notes = program_.notes;
+    for (const std::string& note : notes_on_base(program_, cell_)) found_.notes.push_back(note);
+    if (const std::string note = note_on_taught_targets(program_); !note.empty()) found_.notes.push_back(note);
     const auto add = [&](const std::string& note) {
       if (!note.empty() && std::find(found_.notes.begin(), found_.notes.end(), note) == found_.notes.end())
         found_.notes.push_back(note);
@@ -174,6 +178,7 @@ Status check_line_ends(const Program& program) {
 Result<NominalTargets> nominal_targets(const Program& program, const ArmOfProgram& arm, const CellTools& cell,
                                        const std::string& tool, const std::string& payload, BareTools bare) {
   if (const Status lines = check_line_ends(program); !lines) return tl::make_unexpected(lines.error());
+  if (const Status same = check_stated_robot(program, arm.robot()); !same) return tl::make_unexpected(same.error());
   std::vector<ToolUse> uses(program.tools.size(), ToolUse::kNone);
   for (const ProgramTarget& target : program.targets) {
     const bool joints = bare == BareTools::kOfTheCell && is_joints(target.coordinates);

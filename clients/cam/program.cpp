@@ -68,6 +68,46 @@ bool is_joints(Coordinates coordinates) {
   return coordinates == Coordinates::kJoints || coordinates == Coordinates::kJointRadians;
 }
 
+std::string pose_text(const Pose& X) {
+  const Vector3 p = X.translation() * to_mm(1);
+  const Eigen::Quaterniond q(X.linear());
+  return fmt::format("[{:.3f}, {:.3f}, {:.3f}] mm [{:.6f}, {:.6f}, {:.6f}, {:.6f}]", p.x(), p.y(), p.z(), q.w(), q.x(),
+                     q.y(), q.z());
+}
+
+std::string apart_text(const Pose& a, const Pose& b) {
+  return fmt::format("{:.3f} mm and {:.4f} deg apart", to_mm((a.translation() - b.translation()).norm()),
+                     to_deg(pose_difference(a, b).tail<3>().norm()));
+}
+
+bool take_row(const std::string& row, const ReadOptions& options, ProgramTool& tool) {
+  tool.row = row;
+  const auto given = options.frames.find(row);
+  tool.from_row = given != options.frames.end();
+  if (tool.from_row) tool.X_FT = given->second;
+  return tool.from_row;
+}
+
+bool take_row(const std::string& row, const ReadOptions& options, ProgramFrame& frame) {
+  frame.row = row;
+  const auto given = options.frames.find(row);
+  frame.in_base = given != options.frames.end();
+  if (frame.in_base) frame.X_BO = given->second;
+  return frame.in_base;
+}
+
+FramesRows rows_of(const Program& program) {
+  FramesRows rows;
+  for (const ProgramTool& tool : program.tools) {
+    if (!tool.row.empty()) (tool.X_FT ? rows.used : rows.open).insert(tool.row);
+  }
+  for (const ProgramFrame& frame : program.frames) {
+    if (!frame.row.empty()) (frame.why_not.empty() ? rows.used : rows.open).insert(frame.row);
+  }
+  rows.used.insert(kRobotBase);
+  return rows;
+}
+
 bool same_tool_of_program(const ProgramTool& a, const ProgramTool& b) {
   return a.name == b.name && a.file == b.file && a.line == b.line && a.carries == b.carries;
 }

@@ -83,13 +83,44 @@ struct ProgramTool {
   std::string why_not;           ///< why its targets cannot be corrected; empty: they can
   std::string carries = {};    ///< the load that motions set, as the program calls it; empty: `load` is the tool's own
   std::string load_note = {};  ///< why that load cannot be compared
+  std::string row = {};        ///< of --frames, that may tell X_FT; empty: none may
+  bool from_row = false;       ///< X_FT is what that row says
 };
 
-/// A frame that targets are given in, seen from the robot's base.
+/// A frame that targets are given in. A reader tells it as seen from the controller's world; read_program() makes it
+/// seen from the robot's base.
 struct ProgramFrame {
   std::string name;
   Pose X_BO = Pose::Identity();
-  std::string why_not;  ///< why its targets cannot be corrected; empty: they can
+  std::string why_not;   ///< why its targets cannot be corrected; empty: they can
+  std::string row = {};  ///< of --frames, that may tell X_BO; empty: none may
+  bool in_base = false;  ///< the reader has it seen from the robot's base already, as rows of --frames are
+};
+
+/// Where the robot stands in the controller's world, and who says so.
+struct StatedBase {
+  Pose X_WB;
+  std::string name;  ///< `$ROBROOT`
+  std::string file;
+  int line = 0;  ///< 0: not a line of a file
+};
+
+/// A number of a robot that its controller's files state, so that another robot than the cell's is found out.
+enum class ArmNumber { kAxes, kHeightOfAxis2, kAxis1ToAxis2, kAxis2ToAxis3, kAxis3ToWrist, kWristToFlange };
+struct StatedNumber {
+  ArmNumber of = ArmNumber::kAxes;
+  double value = 0;  ///< m; of kAxes their number
+  std::string name;  ///< `$LENGTH_A`
+  std::string file;
+  int line = 0;
+};
+
+/// The type of a robot as its controller's files state it.
+struct StatedType {
+  std::string type;  ///< `#KR210R2700 EXTRA C4 FLR`
+  std::string name;  ///< `$TRAFONAME`
+  std::string file;
+  int line = 0;
 };
 
 /// A target that may be corrected.
@@ -160,7 +191,10 @@ struct Program {
   std::vector<LeftAlone> left;
   std::vector<ProgramMove> moves;
   std::vector<Reading> readings;
-  std::vector<std::string> notes;  ///< what could not be compared, a sentence each
+  std::vector<StatedBase> bases;      ///< the first holds
+  std::vector<StatedNumber> numbers;  ///< of the robot
+  std::vector<StatedType> types;      ///< of the robot
+  std::vector<std::string> notes;     ///< what could not be compared, a sentence each
 
   /// Whether any motion or target was seen in any of the files, be it one that is left as it is.
   [[nodiscard]] bool is_understood() const { return !(moves.empty() && targets.empty() && left.empty()); }
@@ -172,6 +206,24 @@ struct ReadOptions {
   std::map<std::string, Pose> frames = {};  ///< values of tools and frames that the files leave open, by name
   std::set<std::string> spared = {};        ///< files that are read and not written
 };
+
+/// The row of --frames that tells where the robot stands in the world that the program's frames are told in.
+constexpr const char* kRobotBase = "robot_base";
+
+/// `[0.000, 0.000, 600.000] mm [1.000000, 0.000000, 0.000000, 0.000000]`
+[[nodiscard]] std::string pose_text(const Pose& X);
+/// `2.500 mm and 0.0000 deg apart`
+[[nodiscard]] std::string apart_text(const Pose& a, const Pose& b);
+
+/// Gives a tool or frame the value of a row of --frames, which it may have. Whether there is such a row.
+bool take_row(const std::string& row, const ReadOptions& options, ProgramTool& tool);
+bool take_row(const std::string& row, const ReadOptions& options, ProgramFrame& frame);
+
+/// Names of rows of --frames: those whose values a program has, and those that it still lacks.
+struct FramesRows {
+  std::set<std::string> used, open;
+};
+[[nodiscard]] FramesRows rows_of(const Program& program);
 
 /// A tool of the list that is the same to every motion: name, place, and what it carries.
 [[nodiscard]] bool same_tool_of_program(const ProgramTool& a, const ProgramTool& b);

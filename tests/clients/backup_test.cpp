@@ -102,6 +102,39 @@ TEST_F(ImportBackup, RefusesWhatDoesNotMakeACell) {
   EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--unit", "ROB_1", "--task", "task1"}), 0);
 }
 
+TEST_F(ImportBackup, AWorkObjectWithTwoValuesIsLeftOutAndNamedWithBoth) {
+  const std::string belt =
+      "MODULE {}\n  TASK PERS wobjdata wBelt:=[FALSE,TRUE,\"\",[[{},0,500],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n"
+      "  PERS loaddata lBelt:=[{},[0,0,50],[1,0,0,0],0,0,0];\nENDMODULE\n";
+  folder_.write("backup/RAPID/TASK1/PROGMOD/a.mod", fmt::format(fmt::runtime(belt), "A", 1500, 4));
+  folder_.write("backup/RAPID/TASK1/PROGMOD/b.mod", fmt::format(fmt::runtime(belt), "B", 700, 5));
+  ASSERT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot, "--frames", file("frames.csv"), "--json",
+                 file("j.json")}),
+            0);
+  EXPECT_NE(text("frames.csv").find("wPanel,"), std::string::npos);
+  EXPECT_EQ(text("frames.csv").find("wBelt"), std::string::npos);
+  EXPECT_EQ(text("cell.yaml").find("lBelt"), std::string::npos);
+  const std::string notes = nlohmann::json::parse(text("j.json"))["notes"].dump();
+  for (const char* part :
+       {"wBelt", "a.mod line 2", "[1500.000, ", "b.mod line 2", "[700.000, ", "lBelt", "a.mod line 3"})
+    EXPECT_NE(notes.find(part), std::string::npos) << part << ": " << notes;
+}
+
+TEST_F(ImportBackup, SaysWhoseBackupItIsWhereItIsNotAbbs) {
+  const std::vector<std::pair<std::string, std::string>> others = {
+      {"KRC/R1/Mada/$machine.dat", "KUKA"}, {"MD/sysframe.va", "FANUC"}, {"JOBS/TRIM1.JBI", "Yaskawa"}};
+  for (const auto& [name, maker] : others) {
+    std::filesystem::remove_all(file("backup"));
+    std::filesystem::create_directories(std::filesystem::path(file("backup/" + name)).parent_path());
+    folder_.write("backup/" + name, "x\n");
+    testing::internal::CaptureStderr();
+    EXPECT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot}), 3);
+    const std::string said = testing::internal::GetCapturedStderr();
+    EXPECT_NE(said.find("the backup of a " + maker + " controller"), std::string::npos) << said;
+    EXPECT_EQ(said.find("MOC.cfg"), std::string::npos) << said;
+  }
+}
+
 TEST_F(ImportBackup, AnythingMayStandInTheParameters) {
   const std::string good = text(moc);
   for (std::size_t cut = 0; cut < good.size(); cut += 7)

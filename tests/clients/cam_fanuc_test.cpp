@@ -201,6 +201,23 @@ TEST(Fanuc, APayloadThatOnlyTheControllerKnowsIsSaid) {
   EXPECT_NE(made.program.notes[0].find("PAYLOAD[3] (p1.ls line"), std::string::npos) << made.program.notes[0];
 }
 
+TEST(Fanuc, APayloadThatIsSelectedOftenIsSaidOnce) {
+  std::string lines;
+  for (int k = 2; k < 33; ++k) lines += fmt::format("  {:2}:  PAYLOAD[3] ;\n", k);
+  const test::Corrected made = ls(program(lines + "  33:L P[1] 100mm/sec FINE ;\n", position(1, kXyz)));
+  ASSERT_EQ(made.program.notes.size(), 1u);
+  EXPECT_NE(made.program.notes[0].find("PAYLOAD[3] (p1.ls line 7 and 30 more)"), std::string::npos)
+      << made.program.notes[0];
+}
+
+TEST(Fanuc, AToolOfARowThatIsNotTheCellsIsRefusedAtTheRow) {
+  ReadOptions read;
+  read.frames = {{"UTOOL[2]", make_pose(test::spindle_only().tools.at("spindle").linear(), {.1, 0, .1525})}};
+  const test::Corrected made = ls(program("   2:J P[1] 100% FINE ;\n", position(1, kXyz)), read);
+  EXPECT_NE(made.refusal.find("in the row of --frames"), std::string::npos) << made.refusal;
+  EXPECT_EQ(made.refusal.find("row 0"), std::string::npos) << made.refusal;
+}
+
 TEST(Fanuc, ARegisterThatIsMadeOfACorrectedPositionIsSaidToMoveWithIt) {
   const test::Corrected made = ls(
       program("   2:  PR[5]=P[1] ;\n   3:L P[1] 100mm/sec FINE ;\n   4:L PR[5] 100mm/sec FINE ;\n", position(1, kXyz)));

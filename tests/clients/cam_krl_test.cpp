@@ -260,5 +260,112 @@ TEST(Krl, AnArcIsCorrectedWithBothPointsOrWithNone) {
   EXPECT_EQ(made.program.moves_corrected, 0u);
 }
 
+const std::string kFdat =
+    "DEFDAT p\nDECL E6POS XP1={X 300,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\n"
+    "DECL FDAT FP1={TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE,POINT2[] \" \",TQ_STATE FALSE}\n"
+    "DECL FDAT FTCP={TOOL_NO 1,BASE_NO 2,IPO_FRAME #TCP,POINT2[] \" \",TQ_STATE FALSE}\nENDDAT\n";
+
+TEST(Krl, WhatASplineSetsAtItsHeadHoldsForEachOfItsMotions) {
+  const std::string far = "{X 1800,Y 0,Z 1000,A 0,B 60,C 0}";
+  for (const char* head :
+       {"SPLINE WITH $BASE=BASE_DATA[2]\n", "SPLINE WITH $VEL={CP 0.2,ORI1 200,ORI2 200}, $BASE=SBASE(FP1.BASE_NO)\n",
+        "SPLINE WITH $VEL=SVEL_CP( 0.2, , L1), $TOOL=STOOL2( FP1), $BASE= SBASE( FP1.BASE_NO),$IPO_MODE=SIPO_MODE( "
+        "FP1.IPO_FRAME), $LOAD=SLOAD( FP1.TOOL_NO)\n",
+        "PTP_SPLINE WITH $BASE=BASE_DATA[2]\n"}) {
+    const test::Corrected made = krl(program("$BASE=$NULLFRAME\n" + std::string(head) + "SPL " + kPoint + "\nSLIN " +
+                                             kMore + "\nENDSPLINE\nSLIN " + far + "\n"),
+                                     kFdat);
+    ASSERT_EQ(made.refusal, "") << head;
+    EXPECT_NEAR(row_of(made.program, kPoint).p_B.x(), 1.8, 1e-9) << head << why(made, kPoint);
+    EXPECT_NEAR(row_of(made.program, kMore).p_B.x(), 1.81, 1e-9) << head << why(made, kMore);
+    EXPECT_NEAR(row_of(made.program, far).p_B.x(), 1.8, 1e-9) << head << "behind the block, what held before it";
+  }
+  const test::Corrected tool =
+      krl(program("SPLINE WITH $TOOL={X 100,Y 0,Z 152.5,A 0,B -45,C 0}\nSPL " + kPoint + "\nENDSPLINE\n"));
+  EXPECT_NE(tool.refusal.find("2.500 mm"), std::string::npos) << tool.refusal;
+}
+
+TEST(Krl, WhatWithSetsAndNobodyCanTellLeavesTheMotion) {
+  for (const auto& [with, reason] : std::vector<std::pair<std::string, std::string>>{
+           {"$BASE.X=5", "a part of $BASE is set"},
+           {"$TOOL.Z=5", "a part of $TOOL is set"},
+           {"$BASE=MY_BASE(FP1)", "not constant"},
+           {"$BASE=EK(K_ROOT(FP1.BASE_NO),K_TYPE(FP1.BASE_NO),K_OFFS(FP1.BASE_NO))", "external kinematics"},
+           {"$LOAD=MY_LOAD(1)", "$LOAD is not constant"},
+           {"$IPO_MODE=MODE", "$IPO_MODE is not constant"}}) {
+    const test::Corrected made = krl(program("SLIN " + kPoint + " WITH $VEL.CP=0.1, " + with + "\n"), kFdat);
+    EXPECT_NE(why(made, kPoint).find(reason), std::string::npos) << with << ": " << why(made, kPoint) << made.refusal;
+  }
+}
+
+TEST(Krl, AToolThatStandsIsSaidInEveryForm) {
+  for (const char* with : {"$IPO_MODE= SIPO_MODE( FTCP.IPO_FRAME)", "$IPO_MODE=#TCP",
+                           "$TOOL= STOOL2( FTCP), $BASE= SBASE( FTCP.BASE_NO),$IPO_MODE= SIPO_MODE( FTCP.IPO_FRAME)"}) {
+    const test::Corrected made = krl(program("SPTP XP1 WITH $VEL_AXIS[1]= SVEL_JOINT( 100.0), " + std::string(with) +
+                                             "\nSLIN " + kPoint + " WITH $IPO_MODE= SIPO_MODE( FP1.IPO_FRAME)\n"),
+                                     kFdat);
+    EXPECT_NE(why(made, "XP1").find("the tool stands"), std::string::npos) << with << why(made, "XP1");
+    EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << with << why(made, kPoint);
+    const test::Corrected spline = krl(program("SPLINE WITH " + std::string(with) + "\nSPL XP1\nENDSPLINE\n"), kFdat);
+    EXPECT_NE(why(spline, "XP1").find("the tool stands"), std::string::npos) << with << why(spline, "XP1");
+  }
+}
+
+TEST(Krl, ABaseThatExternalKinematicsCarryIsLeft) {
+  const test::Corrected made = krl(program("LIN " + kPoint + "\nBAS(#EX_BASE,2)\nLIN " + kMore +
+                                           "\nBAS(#BASE,2)\nLIN {X 320,Y 0,Z 500,A 0,B "
+                                           "60,C 0}\n"));
+  EXPECT_TRUE(row_of(made.program, kPoint).corrected());
+  EXPECT_NE(why(made, kMore).find("external kinematics carry the base (p.src line"), std::string::npos)
+      << why(made, kMore);
+  EXPECT_TRUE(row_of(made.program, "{X 320,Y 0,Z 500,A 0,B 60,C 0}").corrected());
+  for (const auto& [index, carried] : {std::pair("3", true), std::pair("0", false), std::pair("-1", false)}) {
+    const test::Corrected unit = krl(program("BAS(#BASE,2)\nLIN " + kPoint + "\n"),
+                                     "DEFDAT p\nMACH_DEF_INDEX[2]=" + std::string(index) + "\nENDDAT\n");
+    EXPECT_EQ(row_of(unit.program, kPoint).corrected(), !carried) << index << why(unit, kPoint);
+  }
+}
+
+TEST(Krl, ALoadThatNobodyToldIsTheControllersDefault) {
+  for (const char* load : {"{M -1}", "{M -1.00000,CM {X 0.0,Y 0.0,Z 0.0,A 0.0,B 0.0,C 0.0},J {X 0.0,Y 0.0,Z 0.0}}"}) {
+    std::string config = kConfig;
+    const std::size_t at = config.find("LOAD_DATA[1]=") + 13;
+    config.replace(at, config.find("\r\n", at) - at, load);
+    const test::Corrected made = corrected_by_shift(
+        Dialect::kKrl, {{"p.src", program("$LOAD=LOAD_DATA[1]\nLIN " + kPoint + "\n")}, {"$config.dat", config}});
+    EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << why(made, kPoint) << made.refusal;
+    ASSERT_EQ(made.program.notes.size(), 1u) << load;
+    EXPECT_NE(made.program.notes[0].find("a load of -1 kg ($config.dat line 5): the controller takes its default load"),
+              std::string::npos)
+        << made.program.notes[0];
+  }
+}
+
+TEST(Krl, TheControllersOwnBasIsKnown) {
+  const std::string bas =
+      "&ACCESS RO\nGLOBAL DEF BAS(CMD :IN, VAL :IN)\nDECL BAS_COMMAND CMD\nSWITCH CMD\nCASE #BASE\nTAKE( )\nENDSWITCH\n"
+      "END\nDEF TAKE( )\nIF FDAT_ACT.BASE_NO==0 THEN\n$BASE=$WORLD\nELSE\n$BASE=BASE_DATA[FDAT_ACT.BASE_NO]\nENDIF\n"
+      "END\n";
+  const auto with = [&](const std::string& name, const std::string& text) {
+    return corrected_by_shift(
+        Dialect::kKrl,
+        {{"R1/p.src", "DEF p( )\nBAS(#INITMOV,0)\nBAS(#TOOL,1)\nBAS(#BASE,2)\nLIN " + kPoint + "\nEND\n"},
+         {"R1/$config.dat", kConfig},
+         {name, text}});
+  };
+  const test::Corrected made = with("R1/System/bas.src", bas);
+  EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << why(made, kPoint);
+  EXPECT_EQ(made.program.files[2].text, bas);
+  EXPECT_FALSE(row_of(with("R1/own.src", bas).program, kPoint).corrected()) << "a routine of the user's own";
+}
+
+TEST(Krl, AMotionToWhereTheAxesAreHasNoTarget) {
+  const test::Corrected made = krl(program("PTP $AXIS_ACT\nPTP $AXIS_ACT C_PTP\nLIN " + kPoint + "\n"));
+  EXPECT_EQ(made.program.left_alone(), 0u);
+  EXPECT_EQ(made.program.moves, 1u);
+  EXPECT_FALSE(row_of(krl(program("LIN $POS_ACT\n")).program, "$POS_ACT").corrected());
+  EXPECT_EQ(krl(program("LIN $POS_ACT\n")).program.left_alone(), 1u) << "it depends on the tool";
+}
+
 }  // namespace
 }  // namespace trammel::cam

@@ -109,6 +109,7 @@ TEST_P(Posts, ComeBackWithCorrectedNumbersAndEveryOtherByte) {
     EXPECT_EQ(fmt::format("{} {} {}", made.program.moves, made.program.moves_corrected, made.program.left_alone()),
               wanted[post.kind + "/" + post.name]);
     for (const ReceiptRow& row : made.program.rows) EXPECT_TRUE(row.corrected() || !row.message.empty()) << row.name;
+    for (const std::string& note : made.program.notes) EXPECT_EQ(note.find("look taught"), std::string::npos) << note;
     for (const SourceFile& file : post.files) {
       const auto at = static_cast<std::size_t>(&file - post.files.data());
       if (!made.program.changed[at]) continue;

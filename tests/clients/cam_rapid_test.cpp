@@ -64,6 +64,20 @@ TEST(Rapid, AFileWhoseLinesEndInCrAloneIsRefused) {
   EXPECT_NE(rapid(text).refusal.find("end in CR alone"), std::string::npos) << rapid(text).refusal;
 }
 
+TEST(Rapid, ALoadBesideACellWithoutPayloadsIsSaidNotToBeCompared) {
+  CellTools cell = test::spindle_only();
+  cell.payloads.clear();
+  const std::string text = program(target("p10", "0,0,400"), move_l("p10"));
+  const test::Corrected made = corrected_by_shift(Dialect::kRapid, {{"m.mod", text}}, {}, {}, cell);
+  ASSERT_EQ(made.program.notes.size(), 1u);
+  EXPECT_NE(
+      made.program.notes[0].find("load of tool tSpindle is 100.000 kg at [0.0, 0.0, 100.0] mm in the program, the "
+                                 "cell has no payloads: it is not compared"),
+      std::string::npos)
+      << made.program.notes[0];
+  EXPECT_TRUE(rapid(text).program.notes.empty()) << "with a payload it is compared";
+}
+
 TEST(Rapid, NumbersKeepTheWayTheyAreWritten) {
   const test::Corrected made = rapid(program(target("p10", ".5,+250.,4E+02"), move_l("p10")));
   EXPECT_NE(made.program.files[0].text.find("[[.623,+249.765,4.00346E+02]"), std::string::npos)

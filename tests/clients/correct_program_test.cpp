@@ -182,6 +182,56 @@ TEST_F(CorrectProgram, AFolderRunLeavesTheControllersOwnFilesAsTheyAre) {
   EXPECT_NE(text("asked/$config.dat"), text("in" + config)) << "asked for by its name";
 }
 
+TEST_F(CorrectProgram, ADatFileOfAFolderIsKrlOnlyWhereItLooksLikeIt) {
+  for (const auto& [program, other] : {std::pair("drill.ls", "orderfil.dat"), std::pair("drill.jbi", "HOME2.DAT"),
+                                       std::pair("drill.mod", "log.dat")}) {
+    fs::remove_all(file("in"));
+    fs::create_directories(file("in"));
+    fs::copy(kPrograms + program, file(std::string("in/") + program));
+    folder_.write(std::string("in/") + other, "! options of this controller\n");
+    EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out"), "--frames", kPrograms + "frames.csv"}), 0)
+        << program;
+  }
+  write_krl_folder(folder_, "krl");
+  EXPECT_EQ(correct({"--model", model(), file("krl"), "-o", file("krl-out")}), kNotAll) << "its data lists are read";
+  EXPECT_TRUE(exists("krl-out/KRC/R1/Program/drill.dat"));
+}
+
+TEST_F(CorrectProgram, RowsOfFramesThatNothingUsesAreRefusedWithTheNamesThereAre) {
+  const std::string header = "name,x_mm,y_mm,z_mm,qw,qx,qy,qz";
+  const std::string tool = "\nUTOOL[1],100,0,150,0.923879532511287,0,-0.382683432365090,0";
+  const std::string frame = ",1800,-250,800,1,0,0,0";
+  const auto with = [&](const std::string& rows, const std::string& command = "correct") {
+    folder_.write("frames.csv", header + rows + "\n");
+    testing::internal::CaptureStderr();
+    const int code = run(command.c_str(), {"--model", model(), kPrograms + "drill.ls", "-o", file("out"), "--frames",
+                                           file("frames.csv")});
+    return fmt::format("{}: {}", code, testing::internal::GetCapturedStderr());
+  };
+  EXPECT_TRUE(with(tool + "\nUFRAME[1]" + frame).starts_with("0: "));
+  EXPECT_TRUE(with(tool + "\nUFRAME[1]" + frame + "\nrobot_base,0,0,0,1,0,0,0").starts_with("0: "));
+  for (const char* name : {"UFRAME[2]", "UFRAM[1]", "robot_bas", "BASE_DATA[1]"}) {
+    for (const char* command : {"correct", "predict"}) {
+      const std::string said = with(tool + "\nUFRAME[1]" + frame + "\n" + name + frame, command);
+      EXPECT_TRUE(said.starts_with("3: ")) << name << said;
+      for (const std::string& part : {std::string("frames.csv row 4"), std::string(name), std::string("UFRAME[1]"),
+                                      std::string("UTOOL[1]"), std::string("robot_base")})
+        EXPECT_NE(said.find(part), std::string::npos) << name << ": " << said;
+    }
+  }
+  EXPECT_TRUE(with(tool + "\nuframe[1]" + frame).starts_with("3: ")) << "misspelt, and the frame is missing";
+  EXPECT_TRUE(
+      with(",may_be_unused" + tool + ",no\nUFRAME[1]" + frame + ",no\nUSER[3]" + frame + ",yes").starts_with("0: "));
+  EXPECT_TRUE(
+      with(",may_be_unused" + tool + ",no\nUFRAME[1]" + frame + ",no\nUSER[3]" + frame + ",no").starts_with("3: "));
+  EXPECT_TRUE(with(",may_be_unused" + tool + ",no\nUFRAME[1]" + frame + ",maybe").starts_with("3: "));
+}
+
+TEST_F(CorrectProgram, FramesOfABackupServeEveryProgramOfIt) {
+  ASSERT_EQ(run("import-backup", {kPrograms + "backup", "--frames", file("frames.csv")}), 0);
+  EXPECT_EQ(correct({"--model", model(), module("m.mod"), "-o", file("out.mod"), "--frames", file("frames.csv")}), 0);
+}
+
 TEST_F(CorrectProgram, ThePageHoldsEverythingItShows) {
   ASSERT_EQ(correct({"--model", model(), module("m.mod"), "-o", file("out.mod"), "--report", file("page.html"),
                      "--tolerance", "0.2", "--json", file("r.json")}),

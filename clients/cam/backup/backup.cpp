@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 #include "clients/cam/backup/parameters.h"
 #include "clients/cam/cell_tools.h"
@@ -30,6 +31,20 @@ const ParameterInstance* named(const std::vector<ParameterInstance>& all, const 
     return one.type == type && one.text("name") == name;
   });
   return found == all.end() ? nullptr : &*found;
+}
+
+std::string yaml_pose(const Pose& X) {
+  const Vector3 p = X.translation() * to_mm(1);
+  Eigen::Quaterniond q(X.linear());
+  if (q.w() < 0) q.coeffs() *= -1;
+  return fmt::format("{{xyz_mm: [{:.6g}, {:.6g}, {:.6g}], q_wxyz: [{:.9g}, {:.9g}, {:.9g}, {:.9g}]}}", p.x() + 0.0,
+                     p.y() + 0.0, p.z() + 0.0, q.w() + 0.0, q.x() + 0.0, q.y() + 0.0, q.z() + 0.0);
+}
+
+std::string yaml_load(const StatedLoad& load) {
+  const Vector3 p = load.p_F * to_mm(1);
+  return fmt::format("{{mass_kg: {:.6g}, cog_mm: [{:.6g}, {:.6g}, {:.6g}]}}", load.mass, p.x() + 0.0, p.y() + 0.0,
+                     p.z() + 0.0);
 }
 
 class Backup {
@@ -150,20 +165,44 @@ class Backup {
     for (const ProgramTool& tool : data.tools) {
       if (Status taken = take(tool); !taken) return taken;
     }
-    for (const ProgramFrame& frame : data.frames) {
+    take_frames(data);
+    take_loads(data);
+    for (auto& [name, X_WO] : cell_.frames) X_WO = X_BW * X_WO;
+    return {};
+  }
+
+  void take_frames(const RapidData& data) {
+    std::map<std::string, std::string> where;
+    std::set<std::string> doubtful;
+    for (const RapidData::Frame& one : data.frames) {
+      const ProgramFrame& frame = one.frame;
       if (!frame.why_not.empty()) {
         cell_.notes.push_back(frame.why_not);
         continue;
       }
-      const auto [known, fresh] = cell_.frames.emplace(frame.name, X_BW * frame.X_BO);
-      if (!fresh && !known->second.isApprox(X_BW * frame.X_BO, 1e-9)) return twice("work object", frame.name);
+      const auto [known, fresh] = cell_.frames.emplace(frame.name, frame.X_BO);
+      if (fresh) where[frame.name] = one.where;
+      if (known->second.isApprox(frame.X_BO, 1e-9)) continue;
+      cell_.notes.push_back("left out: " + two_values("work object", frame.name, pose_text(known->second),
+                                                      where[frame.name], pose_text(frame.X_BO), one.where));
+      doubtful.insert(frame.name);
     }
-    for (const auto& [name, load] : data.loads) {
-      if (!check_name(name, "payload")) continue;
-      const auto [known, fresh] = cell_.loads.emplace(name, load);
-      if (!fresh && (known->second.mass != load.mass || known->second.p_F != load.p_F)) return twice("load", name);
+    for (const std::string& name : doubtful) cell_.frames.erase(name);
+  }
+
+  void take_loads(const RapidData& data) {
+    std::map<std::string, std::string> where;
+    std::set<std::string> doubtful;
+    for (const RapidData::Load& one : data.loads) {
+      if (!check_name(one.name, "payload")) continue;
+      const auto [known, fresh] = cell_.loads.emplace(one.name, one.load);
+      if (fresh) where[one.name] = one.where;
+      if (known->second.mass == one.load.mass && known->second.p_F == one.load.p_F) continue;
+      cell_.notes.push_back("left out: " + two_values("load", one.name, yaml_load(known->second), where[one.name],
+                                                      yaml_load(one.load), one.where));
+      doubtful.insert(one.name);
     }
-    return {};
+    for (const std::string& name : doubtful) cell_.loads.erase(name);
   }
 
   Status take(const ProgramTool& tool) {
@@ -178,40 +217,23 @@ class Backup {
     StatedTool stated{*tool.X_FT, tool.load, fmt::format("{} line {}", tool.file, tool.line)};
     if (stated.load && is_placeholder(*stated.load)) stated.load.reset();
     const auto [known, fresh] = cell_.tools.emplace(tool.name, stated);
-    if (!fresh && !known->second.X_FT.isApprox(stated.X_FT, 1e-9)) return twice("tool", tool.name);
-    return {};
+    if (known->second.X_FT.isApprox(stated.X_FT, 1e-9)) return {};
+    return refused("{}", two_values("tool", tool.name, pose_text(known->second.X_FT), known->second.where,
+                                    pose_text(stated.X_FT), stated.where))
+        .of("tooldata")
+        .with_text(tool.name);
   }
 
-  static Status twice(const char* what, const std::string& name) {
-    return refused("{} {} has two values in the modules", what, shown(name))
-        .of(what)
-        .with_text(name)
-        .next("--task says of which task they are taken");
+  static std::string two_values(const char* what, const std::string& name, const std::string& one,
+                                const std::string& at_one, const std::string& other, const std::string& at_other) {
+    return fmt::format("{} {} has two values in the modules, {} ({}) and {} ({})", what, shown(name), one,
+                       shown(at_one), other, shown(at_other));
   }
 
   const std::string where_;
   const std::vector<ParameterInstance> instances_;
   ControllerCell cell_;
 };
-
-std::string yaml_pose(const Pose& X) {
-  const Vector3 p = X.translation() * to_mm(1);
-  Eigen::Quaterniond q(X.linear());
-  if (q.w() < 0) q.coeffs() *= -1;
-  return fmt::format("{{xyz_mm: [{:.6g}, {:.6g}, {:.6g}], q_wxyz: [{:.9g}, {:.9g}, {:.9g}, {:.9g}]}}", p.x() + 0.0,
-                     p.y() + 0.0, p.z() + 0.0, q.w() + 0.0, q.x() + 0.0, q.y() + 0.0, q.z() + 0.0);
-}
-
-std::string yaml_load(const StatedLoad& load) {
-  const Vector3 p = load.p_F * to_mm(1);
-  return fmt::format("{{mass_kg: {:.6g}, cog_mm: [{:.6g}, {:.6g}, {:.6g}]}}", load.mass, p.x() + 0.0, p.y() + 0.0,
-                     p.z() + 0.0);
-}
-
-std::string apart(const Pose& a, const Pose& b) {
-  return fmt::format("{:.3f} mm and {:.4f} deg apart", to_mm((a.translation() - b.translation()).norm()),
-                     to_deg(pose_difference(a, b).tail<3>().norm()));
-}
 
 bool same(const Pose& a, const Pose& b) {
   return to_mm((a.translation() - b.translation()).norm()) <= kSameMm &&
@@ -225,7 +247,8 @@ void compare_tools(const ControllerCell& controller, const Cell& cell, std::vect
       found.push_back(fmt::format("tool {} ({}) is not in the cell", shown(name), shown(tool.where)));
     } else if (known->second && !same(tool.X_FT, *known->second)) {
       found.push_back(fmt::format("tool {} is {} in the controller, {} in the cell: {}", shown(name),
-                                  yaml_pose(tool.X_FT), yaml_pose(*known->second), apart(tool.X_FT, *known->second)));
+                                  yaml_pose(tool.X_FT), yaml_pose(*known->second),
+                                  apart_text(tool.X_FT, *known->second)));
     }
   }
   for (const auto& [name, X_FT] : cell.tools) {
@@ -304,7 +327,7 @@ std::vector<std::string> differences(const ControllerCell& controller, const Cel
   std::vector<std::string> found;
   if (cell.X_WB && !same(controller.X_WB, *cell.X_WB)) {
     found.push_back(fmt::format("the base is {} in the controller, {} in the cell: {}", yaml_pose(controller.X_WB),
-                                yaml_pose(*cell.X_WB), apart(controller.X_WB, *cell.X_WB)));
+                                yaml_pose(*cell.X_WB), apart_text(controller.X_WB, *cell.X_WB)));
   }
   compare_tools(controller, cell, found);
   compare_loads(controller, cell, found);

@@ -32,8 +32,9 @@ struct ControllerCell {
 };
 
 /// `parameters`: the text of MOC.cfg, called `where` in errors. `unit`: the robot; empty: the only one. Refuses
-/// parameters without a robot, several robots where none is chosen, numbers that are none, and a name of the modules
-/// that stands for two different things. W of the backup's numbers is the controller's world.
+/// parameters without a robot, several robots where none is chosen, numbers that are none, and a tool that has two
+/// values in the modules; a work object or load that has two is left out, with a note. W of the backup's numbers is the
+/// controller's world.
 [[nodiscard]] Result<ControllerCell> read_backup(const std::string& parameters, const std::string& where,
                                                  const std::vector<SourceFile>& modules, const std::string& unit);
 

@@ -51,6 +51,11 @@ struct Selected {
 struct Controller {
   std::map<std::string, Register> registers;
   std::map<std::string, std::string> set_from, changed;  ///< of UFRAME[n] and UTOOL[n]
+  struct Statements {
+    std::string first;  ///< where
+    int count = 0;
+  };
+  std::map<std::string, Statements> loads;  ///< of PAYLOAD[n]
 };
 bool is_number(const std::string& text) {
   return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
@@ -274,9 +279,8 @@ class File {
   void note_load(const Pieces& statement) {
     for (std::size_t at = 0; at + 2 < statement.size(); ++at) {
       if (!statement[at].is("PAYLOAD")) continue;
-      program_.notes.push_back(
-          fmt::format("{} ({} line {}): the controller alone knows this load, it is not compared with the cell's",
-                      indexed(statement, at), program_.files[index_].name, statement[at].line));
+      Controller::Statements& set = controller_.loads[indexed(statement, at)];
+      if (set.count++ == 0) set.first = fmt::format("{} line {}", program_.files[index_].name, statement[at].line);
     }
   }
 
@@ -342,7 +346,6 @@ class File {
 
   /// The value of UFRAME[n] or UTOOL[n]; else why it is not known.
   std::optional<Pose> setting(const std::string& name, std::string& why) const {
-    if (const auto given = options_.frames.find(name); given != options_.frames.end()) return given->second;
     const auto from = controller_.set_from.find(name);
     if (from == controller_.set_from.end()) {
       why = fmt::format("{} is not in the files handed over: --frames tells its value", name);
@@ -365,7 +368,7 @@ class File {
   std::size_t frame_of(const std::string& number_text) {
     ProgramFrame frame;
     frame.name = fmt::format("UFRAME[{}]", number_text);
-    if (number_text != "0") {
+    if (number_text != "0" && !take_row(frame.name, options_, frame)) {
       if (const auto X = setting(frame.name, frame.why_not)) frame.X_BO = *X;
     }
     for (std::size_t k = 0; k < program_.frames.size(); ++k) {
@@ -381,6 +384,8 @@ class File {
     std::string why;
     if (number_text == "0") {
       tool.X_FT = Pose::Identity();
+    } else if (take_row(tool.name, options_, tool)) {
+      tool.rotation_rounding = from_deg(0.001);
     } else if (const auto X = setting(tool.name, why)) {
       tool.X_FT = *X;
       tool.file = program_.files[index_].name;
@@ -562,6 +567,10 @@ Program read_fanuc(std::vector<SourceFile> files, const ReadOptions& options) {
   for (std::size_t f = 0; f < program.files.size(); ++f)
     read.emplace_back(f, program, sites, controller, options).read();
   for (File& file : read) file.read_motions();
+  for (const auto& [load, set] : controller.loads)
+    program.notes.push_back(
+        fmt::format("{} ({}{}): the controller alone knows this load, it is not compared with the cell's", load,
+                    set.first, set.count > 1 ? fmt::format(" and {} more", set.count - 1) : ""));
   sites.finish(program,
                [&](const Site& site, ProgramTarget& target) { return read[site.file].describe(site, target); });
   return program;

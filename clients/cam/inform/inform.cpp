@@ -160,7 +160,7 @@ class Job {
   std::size_t tool_of(const Position& position) {
     ProgramTool tool;
     tool.name = fmt::format("TOOL[{}]", position.tool.empty() ? "0" : position.tool.substr(0, position.tool.find(',')));
-    if (const auto given = options_.frames.find(tool.name); given != options_.frames.end()) tool.X_FT = given->second;
+    take_row(tool.name, options_, tool);
     tool.why_not = why_set(tool.name, "TOOL[*]");
     for (std::size_t k = 0; k < program_.tools.size(); ++k) {
       if (program_.tools[k].name == tool.name) return k;
@@ -176,12 +176,11 @@ class Job {
       frame.name = fmt::format("USER[{}]", position.user);
       frame.why_not = why_set(frame.name, "USER[*]");
       if (!frame.why_not.empty()) return known_frame(std::move(frame));
-      if (const auto given = options_.frames.find(frame.name); given != options_.frames.end()) {
-        frame.X_BO = given->second;
-      } else {
+      if (!take_row(frame.name, options_, frame))
         frame.why_not = fmt::format("{} is not in the job: --frames tells its value", shown(frame.name));
-      }
-    } else if (position.kind != "BASE" && position.kind != "ROBOT" && position.kind != "PULSE") {
+    } else if (position.kind == "ROBOT") {
+      frame.in_base = true;
+    } else if (position.kind != "BASE" && position.kind != "PULSE") {
       frame.why_not = fmt::format("frame {} is not known", shown(position.kind));
     }
     return known_frame(std::move(frame));

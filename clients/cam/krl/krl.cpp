@@ -52,6 +52,8 @@ struct Routine {
 
 constexpr double kSpeedUnknown = -1;
 
+constexpr const char* kToolStands = "the tool stands and the robot holds the work piece";
+
 /// What the controller has set when a motion comes.
 struct State {
   std::size_t tool = 0, frame = 0;
@@ -73,6 +75,12 @@ bool is_relative(const std::string& word) {
   return word.ends_with("_REL") && is_motion(word.substr(0, word.size() - 4));
 }
 
+/// `PTP $AXIS_ACT` goes to where the axes are: it has no target.
+bool stands_still(const std::vector<Token>& tokens) {
+  const bool alone = tokens.size() == 2 || (tokens.size() > 2 && tokens[2].kind == TokenKind::kWord);
+  return alone && tokens[1].text == "$AXIS_ACT";
+}
+
 class Reader {
  public:
   Reader(std::vector<SourceFile> files, const ReadOptions& options) : options_(options) {
@@ -86,6 +94,8 @@ class Reader {
   Program read() {
     for (std::size_t f = 0; f < program_.files.size(); ++f) collect(f);
     names_.join_globals();
+    find_base();
+    find_numbers();
     std::set<std::string> called;
     for (std::size_t r = 0; r < routines_.size(); ++r) by_name_.emplace(routines_[r].name, r);
     find_interrupts(called);
@@ -110,11 +120,18 @@ class Reader {
     int open = -1;  // the routine that the line is in
     MarkPlace mark{program_.files[f].text.starts_with("\xEF\xBB\xBF") ? std::size_t{3} : 0, "; "};
     const std::vector<Line>& lines = lines_[f];
+    if (is_controllers_bas(f)) return program_.mark_places.push_back(mark);
+    std::size_t spline = lines.size();  // the head of the block that the line is in; their number: none
     bool any = false;
     for (std::size_t k = 0; k < lines.size(); ++k) {
       note_tool_name(lines[k]);
+      note_robot(f, k);
       const std::vector<Token>& tokens = lines[k].tokens;
       const std::size_t first = !tokens.empty() && tokens[0].text == "GLOBAL" ? 1 : 0;
+      const std::string word = tokens.empty() ? "" : tokens[0].text;
+      if (word == "ENDSPLINE") spline = lines.size();
+      if (spline < lines.size()) spline_heads_[{f, k}] = spline;
+      if (word == "SPLINE" || word == "PTP_SPLINE") spline = k;
       if (tokens.size() > first + 1 &&
           (tokens[first].text == "DEF" || tokens[first].text == "DEFFCT" || tokens[first].text == "DEFDAT")) {
         const std::size_t name = first + (tokens[first].text == "DEFFCT" && tokens.size() > first + 2 ? 2 : 1);
@@ -134,6 +151,16 @@ class Reader {
     program_.mark_places.push_back(mark);
   }
 
+  /// The controller's own `bas.src`: BAS( ) means the same with it among the files as without.
+  [[nodiscard]] bool is_controllers_bas(std::size_t f) const {
+    const std::string& name = program_.files[f].name;
+    if (upper(name.substr(name.find_last_of("/\\") + 1)) != "BAS.SRC") return false;
+    return std::any_of(lines_[f].begin(), lines_[f].end(), [](const Line& line) {
+      const std::size_t first = !line.tokens.empty() && line.tokens[0].text == "GLOBAL" ? 1 : 0;
+      return line.tokens.size() > first + 1 && line.tokens[first].text == "DEF" && line.tokens[first + 1].text == "BAS";
+    });
+  }
+
   /// `;FOLD PTP P1 ... Tool[1]:spindle Base[2]:panel;...`
   void note_tool_name(const Line& line) {
     if (!line.comment.starts_with("FOLD")) return;
@@ -144,6 +171,78 @@ class Reader {
     const std::string number(line.comment.substr(at + 5, close - at - 5));
     tool_names_.emplace(number, std::string(line.comment.substr(close + 2, end - close - 2)));
   }
+
+  // What `$machine.dat` says of the robot.
+
+  /// Each value that a variable of the controller is given in the files.
+  template <typename Work>
+  void at_each(const std::string& name, const Work& work) const {
+    for (const auto& [key, variable] : names_.all()) {
+      if (key.second != name) continue;
+      for (const Assigned& at : variable.values) {
+        if (at.operands.size() == 1) work(at, at.operands[0]);
+      }
+    }
+  }
+
+  void find_base() {
+    if (!on_rail_.empty()) {
+      program_.notes.push_back(
+          fmt::format("an external axis carries the robot ({}): $ROBROOT moves and is not used", on_rail_));
+      return;
+    }
+    at_each("$ROBROOT", [&](const Assigned& at, const Value&) {
+      const Told<Pose> X_WB = names_.frame_of(at.operands, at.file);
+      if (X_WB) program_.bases.push_back({*X_WB, "$ROBROOT", program_.files[at.file].name, line_at(at)});
+    });
+    if (const auto row = options_.frames.find(kRobotBase); row != options_.frames.end())
+      names_.set_robroot(row->second);
+    else if (!program_.bases.empty())
+      names_.set_robroot(program_.bases.front().X_WB);
+  }
+
+  void find_numbers() {
+    const auto add = [&](ArmNumber of, const char* name, const auto& value_of) {
+      at_each(name, [&](const Assigned& at, const Value& value) {
+        if (const std::optional<double> number = value_of(at, value))
+          program_.numbers.push_back({of, *number, name, program_.files[at.file].name, line_at(at)});
+      });
+    };
+    const auto count = [](const Assigned&, const Value& value) -> std::optional<double> {
+      return value.kind == Value::Kind::kNumber ? std::optional<double>(value.number) : std::nullopt;
+    };
+    const auto length = [](const Assigned&, const Value& value) -> std::optional<double> {
+      // Arms of other kinds have zeros there.
+      const bool said = value.kind == Value::Kind::kNumber && value.number != 0;
+      return said ? std::optional<double>(from_mm(value.number)) : std::nullopt;
+    };
+    const auto along = [&](const Assigned& at, const Value&) -> std::optional<double> {
+      const Told<Pose> X = names_.frame_of(at.operands, at.file);
+      const bool said = X && !X->translation().isZero();
+      return said ? std::optional<double>(X->translation().norm()) : std::nullopt;
+    };
+    add(ArmNumber::kAxes, "$NUM_AX", count);
+    add(ArmNumber::kHeightOfAxis2, "$TIRORO", along);
+    add(ArmNumber::kAxis1ToAxis2, "$LENGTH_A", length);
+    add(ArmNumber::kAxis2ToAxis3, "$LENGTH_B", length);
+    add(ArmNumber::kAxis3ToWrist, "$TX3P3", along);
+    add(ArmNumber::kWristToFlange, "$TFLWP", along);
+  }
+
+  /// `$TRAFONAME[]="#KR210R2700 EXTRA C4 FLR"`, `DECL EX_KIN $EX_KIN={ET1 #ERSYS,...}`
+  void note_robot(std::size_t f, std::size_t k) {
+    const std::vector<Token>& tokens = lines_[f][k].tokens;
+    const auto has = [&](const char* word) {
+      return std::any_of(tokens.begin(), tokens.end(), [&](const Token& token) { return token.text == word; });
+    };
+    if (has("$EX_KIN") && has("ERSYS")) on_rail_ = names_.place(f, k);
+    if (tokens.size() < 3 || tokens[0].text != "$TRAFONAME" || tokens.back().kind != TokenKind::kText) return;
+    const std::string& text = tokens.back().text;
+    program_.types.push_back(
+        {text.substr(1, text.size() - 2), "$TRAFONAME", program_.files[f].name, lines_[f][k].number});
+  }
+
+  [[nodiscard]] int line_at(const Assigned& at) const { return lines_[at.file][at.line].number; }
 
   // Tools and bases.
 
@@ -170,17 +269,18 @@ class Reader {
     ProgramTool tool;
     const auto named = tool_names_.find(std::to_string(number));
     tool.name = named == tool_names_.end() ? data : named->second;
-    if (const auto given = options_.frames.find(data); given != options_.frames.end()) {
-      tool.X_FT = given->second;
-    } else if (const Variable* variable = names_.find(data, f)) {
+    const Variable* variable = names_.find(data, f);
+    if (!take_row(data, options_, tool) && variable != nullptr) {
       if (!variable->changed.empty())
         tool.why_not = variable->changed;
       else if (!variable->values.empty())
         fill(variable->values[0], tool);
     }
     if (const Variable* load = names_.find(fmt::format("LOAD_DATA[{}]", number), f);
-        load != nullptr && !load->values.empty())
+        load != nullptr && !load->values.empty()) {
       tool.load = load_of(load->values[0].operands);
+      tool.load_note = note_on_default(tool.load, load->values[0]);
+    }
     return add_tool(std::move(tool));
   }
 
@@ -200,7 +300,9 @@ class Reader {
     if (operands.size() != 1) return std::nullopt;
     const Value* mass = operands[0].field("M");
     const Value* centre = operands[0].field("CM");
-    if (mass == nullptr || mass->kind != Value::Kind::kNumber || centre == nullptr) return std::nullopt;
+    if (mass == nullptr || mass->kind != Value::Kind::kNumber) return std::nullopt;
+    if (mass->number < 0) return StatedLoad{mass->number, Vector3::Zero(), false};
+    if (centre == nullptr) return std::nullopt;
     StatedLoad load;
     load.mass = mass->number;
     for (Eigen::Index k = 0; k < 3; ++k) {
@@ -209,6 +311,15 @@ class Reader {
       load.p_F(k) = from_mm(number->number);
     }
     return load;
+  }
+
+  /// `{M -1}` says that nobody has told the load.
+  [[nodiscard]] std::string note_on_default(const std::optional<StatedLoad>& load, const Assigned& at) const {
+    if (!load || load->mass >= 0) return "";
+    return fmt::format(
+        "a load of {:g} kg ({}): the controller takes its default load, which is not compared with the "
+        "cell's",
+        load->mass, names_.place(at.file, at.line));
   }
 
   /// `$TOOL = ...`
@@ -235,7 +346,8 @@ class Reader {
   /// `$LOAD = ...`
   std::size_t load_set(const std::vector<Value>& operands, std::size_t f, std::size_t k) {
     Load load{fmt::format("$LOAD ({})", names_.place(f, k)), std::nullopt, "", ""};
-    const std::vector<Value>* value = &operands;
+    const Assigned here{f, k, operands};
+    const Assigned* value = &here;
     if (operands.size() == 1 && operands[0].kind == Value::Kind::kName) {
       load.name = operands[0].name;
       if (names_.find(root_of(load.name), f) == nullptr) {
@@ -243,10 +355,11 @@ class Reader {
         return add_load(std::move(load));
       }
       const Told<const Assigned*> assigned = names_.value_of(load.name, f);
-      if (assigned) value = &(*assigned)->operands;
+      if (assigned) value = *assigned;
       if (!assigned) load.why_not = "$LOAD: " + assigned.error();
     }
-    if (load.why_not.empty()) load.load = load_of(*value);
+    if (load.why_not.empty()) load.load = load_of(value->operands);
+    if (load.load) load.note = note_on_default(load.load, *value);
     if (load.why_not.empty() && !load.load)
       load.why_not = fmt::format("$LOAD is not constant ({})", names_.place(f, k));
     return add_load(std::move(load));
@@ -269,23 +382,33 @@ class Reader {
   std::size_t base_numbered(int number, std::size_t f) {
     if (number == 0) return 1;
     const std::string data = fmt::format("BASE_DATA[{}]", number);
-    if (const auto given = options_.frames.find(data); given != options_.frames.end())
-      return add_frame({data, given->second, ""});
+    if (const std::string why = carried(number, f); !why.empty()) return add_frame({data, Pose::Identity(), why});
     Value name;
     name.kind = Value::Kind::kName;
     name.name = data;
     return base_set({name}, f);
   }
 
+  /// Why a base moves: `MACH_DEF_INDEX[2]=3` hangs it on a unit of the controller; empty: it does not.
+  [[nodiscard]] std::string carried(int number, std::size_t f) const {
+    const Variable* unit = names_.find(fmt::format("MACH_DEF_INDEX[{}]", number), f);
+    if (unit == nullptr || unit->values.empty() || unit->values[0].operands.size() != 1) return "";
+    const Assigned& at = unit->values[0];
+    if (at.operands[0].kind == Value::Kind::kNumber && at.operands[0].number <= 0) return "";
+    return fmt::format("external kinematics carry base {} (MACH_DEF_INDEX, {})", number,
+                       names_.place(at.file, at.line));
+  }
+
   /// `$BASE = ...`
   std::size_t base_set(const std::vector<Value>& operands, std::size_t f) {
-    if (operands.size() == 1 && operands[0].name.starts_with("BASE_DATA[") &&
-        options_.frames.contains(operands[0].name))
-      return add_frame({operands[0].name, options_.frames.at(operands[0].name), ""});
-    const Told<Pose> X_BO = names_.frame_of(operands, f);
-    std::string name = operands.size() == 1 && operands[0].kind == Value::Kind::kName ? operands[0].name : "$BASE";
-    if (X_BO) return add_frame({std::move(name), *X_BO, ""});
-    return add_frame({name, Pose::Identity(), fmt::format("base {}: {}", shown(name), X_BO.error())});
+    ProgramFrame frame;
+    frame.name = operands.size() == 1 && operands[0].kind == Value::Kind::kName ? operands[0].name : "$BASE";
+    const bool numbered = frame.name.starts_with("BASE_DATA[") && frame.name.find('*') == std::string::npos;
+    if (numbered && take_row(frame.name, options_, frame)) return add_frame(std::move(frame));
+    const Told<Pose> X_WO = names_.frame_of(operands, f);
+    if (X_WO) frame.X_BO = *X_WO;
+    if (!X_WO) frame.why_not = fmt::format("base {}: {}", shown(frame.name), X_WO.error());
+    return add_frame(std::move(frame));
   }
 
   /// FDAT of an inline form: `{TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE,...}`
@@ -306,7 +429,7 @@ class Reader {
     const Value* frame = (*assigned)->operands[0].field("IPO_FRAME");
     const std::string& text = program_.files[(*assigned)->file].text;
     const bool fixed = frame != nullptr && upper(text.substr(frame->begin, 4)) == "#TCP";
-    state.fixed_tool = fixed ? "the tool stands and the robot holds the work piece" : "";
+    state.fixed_tool = fixed ? kToolStands : "";
   }
 
   // Second pass: what happens, in the order of the text.
@@ -471,7 +594,7 @@ class Reader {
       if (word == "$TOOL") state.tool = add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, why});
       if (word == "$BASE") state.frame = add_frame({"$BASE", Pose::Identity(), why});
     } else if (word == "$IPO_MODE" && assigns) {
-      state.fixed_tool = tokens.back().text == "TCP" ? "the tool stands and the robot holds the work piece" : "";
+      state.fixed_tool = why_fixed(tokens, 2);
     } else if (word == "FDAT_ACT" && assigns && tokens[2].kind == TokenKind::kWord) {
       apply_fdat(tokens[2].text, f, state);
     } else if (word == "BAS" && tokens.size() >= 6 && tokens[2].text == "#") {
@@ -521,28 +644,65 @@ class Reader {
       state.speed = speed_of(tokens, 5);
     } else if (tokens[3].text == "INITMOV") {
       state.speed = kSpeedUnknown;
+    } else if (tokens[3].text == "EX_BASE") {
+      state.frame = add_frame({"$BASE", Pose::Identity(), carried_at(f, k)});
     } else if (tokens[3].text == "BASE") {
       state.frame = constant ? base_numbered(number, f) : add_frame({"$BASE", Pose::Identity(), "$BASE: " + why});
     }
   }
 
-  /// `WITH $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO)`: for this motion alone.
+  /// `#BASE` or `#TCP`, from a token on.
+  static std::string why_fixed(const std::vector<Token>& tokens, std::size_t at) {
+    const std::string word = at + 1 < tokens.size() && tokens[at].text == "#" ? tokens[at + 1].text : "";
+    return word == "BASE" ? "" : word == "TCP" ? kToolStands : "$IPO_MODE is not constant";
+  }
+
+  [[nodiscard]] std::string carried_at(std::size_t f, std::size_t k) const {
+    return fmt::format("external kinematics carry the base ({})", names_.place(f, k));
+  }
+
+  /// `WITH $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO)`: for this motion, or for those of a spline, alone.
   void apply_with(std::size_t f, std::size_t k, State& state) {
     const std::vector<Token>& tokens = lines_[f][k].tokens;
-    for (std::size_t at = 1; at + 2 < tokens.size(); ++at) {
-      if (tokens[at].text == "$VEL") state.speed = speed_at(tokens, at);
-      if (tokens[at + 1].text != "=" || (tokens[at].text != "$TOOL" && tokens[at].text != "$BASE")) continue;
-      const bool by_fdat =
-          at + 4 < tokens.size() && tokens[at + 3].text == "(" && tokens[at + 4].kind == TokenKind::kWord;
-      std::size_t end = 0;
-      State one = state;
-      if (by_fdat) apply_fdat(tokens[at + 4].text, f, one);
-      if (by_fdat && tokens[at].text == "$TOOL") state.load = 0;
-      if (tokens[at].text == "$TOOL") {
-        state.tool = by_fdat ? one.tool : tool_set(krl::operands_at(tokens, at + 2, &end), f, k);
-      } else {
-        state.frame = by_fdat ? one.frame : base_set(krl::operands_at(tokens, at + 2, &end), f);
-      }
+    std::size_t at = 0;
+    while (at < tokens.size() && tokens[at].text != "WITH") ++at;
+    for (++at; at + 2 < tokens.size(); ++at) {
+      if (tokens[at - 1].text != "WITH" && tokens[at - 1].text != ",") continue;
+      const std::string& name = tokens[at].text;
+      if (name == "$VEL") state.speed = speed_at(tokens, at);
+      if (name == "$TOOL" || name == "$BASE" || name == "$LOAD" || name == "$IPO_MODE")
+        set_with(f, k, at, tokens[at + 1].text == "=", state);
+    }
+  }
+
+  /// One of them; `at` is its name.
+  void set_with(std::size_t f, std::size_t k, std::size_t at, bool assigns, State& state) {
+    const std::vector<Token>& tokens = lines_[f][k].tokens;
+    static const std::set<std::string> kOfFdat = {"STOOL2", "STOOL", "SBASE", "SIPO_MODE", "SLOAD"};
+    const std::string& name = tokens[at].text;
+    const bool calls = at + 4 < tokens.size() && tokens[at + 3].text == "(";
+    const bool by_fdat = calls && kOfFdat.contains(tokens[at + 2].text) && tokens[at + 4].kind == TokenKind::kWord;
+    State one = state;
+    if (by_fdat) apply_fdat(tokens[at + 4].text, f, one);
+    std::size_t end = 0;
+    const auto operands = [&] { return krl::operands_at(tokens, at + 2, &end); };
+    const std::string part = fmt::format("a part of {} is set ({})", name, names_.place(f, k));
+    if (name == "$TOOL") {
+      state.tool = by_fdat   ? one.tool
+                   : assigns ? tool_set(operands(), f, k)
+                             : add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, part});
+      if (by_fdat) state.load = 0;
+    } else if (name == "$BASE") {
+      state.frame = by_fdat                                ? one.frame
+                    : calls && tokens[at + 2].text == "EK" ? add_frame({"$BASE", Pose::Identity(), carried_at(f, k)})
+                    : assigns                              ? base_set(operands(), f)
+                                                           : add_frame({"$BASE", Pose::Identity(), part});
+    } else if (name == "$LOAD") {
+      state.load = by_fdat ? 0 : assigns ? load_set(operands(), f, k) : add_load({"$LOAD", std::nullopt, "", part});
+    } else if (by_fdat) {
+      state.fixed_tool = one.fixed_tool;
+    } else {
+      state.fixed_tool = why_fixed(tokens, at + (calls ? 4 : 2));
     }
   }
 
@@ -562,9 +722,11 @@ class Reader {
   void motion(std::size_t f, std::size_t k, State state) {
     const std::vector<Token>& tokens = lines_[f][k].tokens;
     const std::string& word = tokens[0].text;
+    if (stands_still(tokens)) return;
     const std::size_t move = move_at(f, k);
     program_.moves[move].is_arc = word == "CIRC" || word == "SCIRC";
     if (is_relative(word)) return leave(f, k, text_of(f, tokens, 1), "it is relative to where the robot is");
+    if (const auto head = spline_heads_.find({f, k}); head != spline_heads_.end()) apply_with(f, head->second, state);
     apply_with(f, k, state);
     if (state.speed > program_.moves[move].speed_mm_s.value_or(0) && word.find("PTP") == std::string::npos)
       program_.moves[move].speed_mm_s = state.speed;
@@ -820,6 +982,8 @@ class Reader {
   std::vector<Routine> routines_;
   krl::Variables names_{program_.files, lines_};
   std::map<std::string, std::string> tool_names_;
+  std::map<std::pair<std::size_t, std::size_t>, std::size_t> spline_heads_;  ///< of the lines in a spline block
+  std::string on_rail_;  ///< where an external axis is said to carry the robot; empty: nowhere
   std::vector<Load> loads_ = std::vector<Load>(1);
   std::map<std::string, std::size_t> by_name_;  ///< routines
   std::map<std::size_t, Flow> orders_;          ///< of the lines of each routine

@@ -178,7 +178,8 @@ Told<Pose> Variables::frame_of(const Value& value, std::size_t f, int depth) con
     return pose_of(Coordinates::kAnglesZyx, *numbers);
   }
   if (value.kind != Value::Kind::kName) return because("it is not constant");
-  if (value.name == "$NULLFRAME" || value.name == "$WORLD" || value.name == "$ROBROOT") return Pose::Identity();
+  if (value.name == "$NULLFRAME" || value.name == "$WORLD") return Pose::Identity();
+  if (value.name == "$ROBROOT") return X_WB_;
   if (value.name.starts_with("$")) return because(fmt::format("{} decides it", shown(value.name)));
   const Told<const Assigned*> assigned = value_of(value.name, f);
   if (!assigned) return because(assigned.error());

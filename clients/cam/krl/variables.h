@@ -61,6 +61,8 @@ class Variables {
   /// The only value of a name.
   [[nodiscard]] Told<const Assigned*> value_of(const std::string& name, std::size_t f) const;
   [[nodiscard]] Told<Pose> frame_of(const std::vector<Value>& operands, std::size_t f, int depth = 0) const;
+  /// What `$ROBROOT` stands for: the robot's base, seen from `$WORLD`.
+  void set_robroot(const Pose& X_WB) { X_WB_ = X_WB; }
   [[nodiscard]] static Told<std::vector<double>> numbers_of(const Value& value,
                                                             const std::array<const char*, 6>& fields);
   /// By file and name.
@@ -76,6 +78,7 @@ class Variables {
   const std::vector<std::vector<Line>>& lines_;
   std::map<std::pair<std::string, std::string>, Variable> variables_;
   std::map<std::string, std::set<std::string>> declared_;  ///< in which files each word is
+  Pose X_WB_ = Pose::Identity();
 };
 
 }  // namespace trammel::cam::krl

@@ -81,9 +81,10 @@ class Reader {
         if (declared.routine >= 0 || !declared.value || declared.is_array) continue;
         const Data data{&*declared.value, &own(m), declared.type, &declared};
         if (declared.type == "tooldata") found.tools.push_back(tools_->declared_tool(data));
-        if (declared.type == "wobjdata") found.frames.push_back(tools_->declared_frame(data));
+        const std::string where = fmt::format("{} line {}", program_.files[m].name, declared.line);
+        if (declared.type == "wobjdata") found.frames.push_back({tools_->declared_frame(data), where});
         const auto load = declared.type == "loaddata" ? tools_->load_of(data) : std::nullopt;
-        if (load) found.loads.emplace_back(declared.spelled, *load);
+        if (load) found.loads.push_back({declared.spelled, *load, where});
       }
     }
     return found;

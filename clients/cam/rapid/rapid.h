@@ -16,9 +16,18 @@ namespace trammel::cam {
 
 /// What modules declare, whether motions use it or not: tools, work objects and loads that are constant or persistent.
 struct RapidData {
+  struct Frame {
+    ProgramFrame frame;  ///< seen from the controller's world
+    std::string where;   ///< `user.sys line 12`
+  };
+  struct Load {
+    std::string name;
+    StatedLoad load;
+    std::string where;
+  };
   std::vector<ProgramTool> tools;
-  std::vector<ProgramFrame> frames;
-  std::vector<std::pair<std::string, StatedLoad>> loads;
+  std::vector<Frame> frames;
+  std::vector<Load> loads;
 };
 [[nodiscard]] RapidData read_rapid_data(std::vector<SourceFile> files);
 

@@ -37,9 +37,7 @@ StatedLoad together(const StatedLoad& gripped, const std::optional<StatedLoad>& 
 
 Tools::Tools(Interpreter& meaning, const ReadOptions& options, Program& program)
     : meaning_(meaning), options_(options), program_(program) {
-  if (const auto base = options_.frames.find("robot_base"); base != options_.frames.end())
-    X_BW_ = base->second.inverse();
-  program_.frames.push_back({"wobj0", X_BW_, ""});
+  program_.frames.push_back({"wobj0", Pose::Identity(), ""});
 }
 
 bool Tools::Load::operator==(const Load& other) const {
@@ -149,7 +147,7 @@ std::size_t Tools::tool_of(const Expression& argument, const Scope& scope) {
   tool.name = meaning_.text_of(*expression, *where);
   if (expression->kind == Kind::kName && !meaning_.find(expression->name, *where)) {
     if (expression->name == "tool0") tool.X_FT = Pose::Identity();
-    if (const auto given = options_.frames.find(tool.name); given != options_.frames.end()) tool.X_FT = given->second;
+    if (!tool.X_FT) take_row(tool.name, options_, tool);
     return known_tool(std::move(tool));
   }
   const Told<Data> data = named(*expression, *where);
@@ -204,12 +202,9 @@ std::size_t Tools::frame_of(const Expression* argument, const Scope& scope) {
   frame.name = meaning_.text_of(*expression, *where);
   if (expression->kind == Kind::kName && !meaning_.find(expression->name, *where)) {
     if (expression->name == "wobj0") return 0;
-    if (const auto given = options_.frames.find(frame.name); given != options_.frames.end()) {
-      frame.X_BO = given->second;
-    } else {
+    if (!take_row(frame.name, options_, frame))
       frame.why_not =
           fmt::format("work object {} is not in the files handed over: --frames tells its value", shown(frame.name));
-    }
     return known_frame(std::move(frame));
   }
   const Told<Data> data = named(*expression, *where);
@@ -239,7 +234,7 @@ void Tools::read_frame(const Data& parts, ProgramFrame& frame) const {
   } else if (!*fixed) {
     why = "a mechanical unit moves it";
   } else {
-    frame.X_BO = X_BW_ * *user * *object;
+    frame.X_BO = *user * *object;
     return;
   }
   frame.why_not = fmt::format("work object {}: {}", shown(frame.name), why);

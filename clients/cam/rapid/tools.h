@@ -59,7 +59,6 @@ class Tools {
   Interpreter& meaning_;
   const ReadOptions& options_;
   Program& program_;
-  Pose X_BW_ = Pose::Identity();  ///< the controller's world, seen from the robot's base
   std::vector<Load> loads_ = std::vector<Load>(1);
   std::map<const Expression*, std::size_t> tool_at_, frame_at_;  ///< of Program::tools and frames, by what says them
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> carrying_;

@@ -107,10 +107,7 @@ class Tables {
     program_.tools.emplace_back();
     ProgramFrame& base = program_.frames.emplace_back();
     base.name = "base";
-    if (const auto given = options.frames.find(frame); given != options.frames.end()) {
-      base.name = frame;
-      base.X_BO = given->second;
-    }
+    if (take_row(frame, options, base)) base.name = frame;
   }
 
   Program read() {

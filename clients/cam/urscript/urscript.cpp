@@ -271,7 +271,7 @@ class Script {
   std::size_t unknown_tool() {
     ProgramTool tool;
     tool.name = "tcp";
-    if (const auto given = options_.frames.find("TCP"); given != options_.frames.end()) tool.X_FT = given->second;
+    take_row("TCP", options_, tool);
     program_.tools.push_back(std::move(tool));
     return program_.tools.size() - 1;
   }

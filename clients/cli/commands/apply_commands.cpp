@@ -289,9 +289,11 @@ void add_reading_options(CLI::App& command, std::string& format, std::string& fr
                   fmt::format("What the input is, where its ending does not say so: csv, {}", cam::dialect_names()))
       ->group(group);
   command
-      .add_option("--frames", frames,
-                  "Values of tools and frames that the program leaves to the controller (CSV: "
-                  "name,x_mm,y_mm,z_mm,qw,qx,qy,qz; UFRAME[1], BASE_DATA[2], ...)")
+      .add_option(
+          "--frames", frames,
+          "Values of tools and frames that the program leaves to the controller (CSV: "
+          "name,x_mm,y_mm,z_mm,qw,qx,qy,qz; UFRAME[1], BASE_DATA[2], ...; robot_base: where the robot stands in "
+          "the controller's world)")
       ->group(group);
 }
 

@@ -56,17 +56,17 @@ Result<std::vector<cam::SourceFile>> modules_of(const BackupArguments& arguments
   return std::move(files->files);
 }
 
-/// As --frames of `correct` reads it.
+/// As --frames of `correct` reads it. A program uses a few of them.
 std::string frames_csv(const cam::ControllerCell& controller) {
-  std::string text = "name,x_mm,y_mm,z_mm,qw,qx,qy,qz\n";
+  std::string text = "name,x_mm,y_mm,z_mm,qw,qx,qy,qz,may_be_unused\n";
   const auto add = [&](const std::string& name, const Pose& X) {
     const Vector3 p = X.translation() * to_mm(1);
     const Eigen::Quaterniond q(X.linear());
     text += csv_field(name);
     for (const double value : {p.x(), p.y(), p.z(), q.w(), q.x(), q.y(), q.z()}) text += "," + csv_number(value);
-    text += "\n";
+    text += ",yes\n";
   };
-  add("robot_base", controller.X_WB);
+  add(cam::kRobotBase, controller.X_WB);
   for (const auto& [name, X_BO] : controller.frames) add(name, X_BO);
   return text;
 }
@@ -107,6 +107,57 @@ std::string robot_in(const BackupArguments& arguments) {
   return relative.empty() ? robot.string() : relative.string();
 }
 
+/// Another maker's backup, by the names of files that only his controllers have; nullptr: none is known.
+struct Maker {
+  const char* name;
+  std::vector<const char*> endings;  ///< of paths, in lower case
+  const char* next;
+};
+const Maker* maker_of(const std::string& folder) {
+  static const std::vector<Maker> kMakers = {
+      {"KUKA",
+       {"$machine.dat", "$config.dat", ".src"},
+       "correct takes the folder as it is; write the cell by hand: $machine.dat names the robot, $config.dat has its "
+       "tools (TOOL_DATA) and loads (LOAD_DATA)"},
+      {"FANUC",
+       {".ls", ".tp", ".va", ".sv", "orderfil.dat"},
+       "correct takes its .ls files; write the cell by hand: sysframe.va has the tools ($MNUTOOL) and frames "
+       "($MNUFRAME) as UTOOL[n] and UFRAME[n] of --frames"},
+      {"Yaskawa",
+       {".jbi", ".prm", ".cnd"},
+       "correct takes its .JBI files; write the cell by hand: TOOL.CND has the tools, UFRAME.CND the frames, as "
+       "TOOL[n] "
+       "and USER[n] of --frames"}};
+  std::error_code error;
+  std::vector<std::string> paths;
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error))
+    paths.push_back(lower(it->path().filename().string()));
+  for (const Maker& maker : kMakers) {
+    for (const char* ending : maker.endings) {
+      if (std::any_of(paths.begin(), paths.end(), [&](const std::string& path) { return path.ends_with(ending); }))
+        return &maker;
+    }
+  }
+  return nullptr;
+}
+
+Result<std::string> parameters_of(const BackupArguments& arguments, const std::string& moc) {
+  Result<std::string> parameters = read_text_file(moc);
+  const Maker* maker = parameters ? nullptr : maker_of(arguments.backup);
+  if (maker == nullptr) return parameters;
+  return refused("it is the backup of a {} controller, and only those of ABB are read", maker->name)
+      .in(arguments.backup)
+      .next(maker->next);
+}
+
+/// Which modules to take is for whoever asks to say, unless he has.
+Error advised(Error error, const BackupArguments& arguments) {
+  if (error.field == "tooldata" && error.next.empty())
+    error.next = arguments.task.empty() ? "--task says of which task they are taken"
+                                        : "take the module that is not used out of the backup";
+  return error;
+}
+
 Status check_usage(const BackupArguments& arguments) {
   if (arguments.output.empty() && arguments.compare.empty() && arguments.frames.empty())
     return failure(ErrorCode::kUsage, "nothing to do")
@@ -120,12 +171,12 @@ Status check_usage(const BackupArguments& arguments) {
 Result<Extent> import_backup(const BackupArguments& arguments) {
   if (const Status usage = check_usage(arguments); !usage) return tl::make_unexpected(usage.error());
   const std::string moc = inside(inside(arguments.backup, "SYSPAR"), "MOC.cfg");
-  const Result<std::string> parameters = read_text_file(moc);
+  const Result<std::string> parameters = parameters_of(arguments, moc);
   if (!parameters) return tl::make_unexpected(parameters.error());
   const auto modules = modules_of(arguments);
   if (!modules) return tl::make_unexpected(modules.error());
   const auto controller = cam::read_backup(*parameters, moc, *modules, arguments.unit);
-  if (!controller) return tl::make_unexpected(controller.error());
+  if (!controller) return tl::make_unexpected(advised(controller.error(), arguments));
   std::vector<std::string> differing;
   if (!arguments.compare.empty()) {
     const Result<Cell> cell = read_cell(arguments.compare);

@@ -183,13 +183,7 @@ void add_receipts(const Corrected& done, const CorrectProgramArguments& argument
 }
 
 Result<cam::Program> read(const ProgramFiles& files, const CorrectProgramArguments& arguments) {
-  cam::ReadOptions reading{arguments.split, arguments.keep_joints, {}, files.system};
-  if (!arguments.frames.empty()) {
-    Result<std::map<std::string, Pose>> frames = read_frames_csv(arguments.frames);
-    if (!frames) return tl::make_unexpected(frames.error());
-    reading.frames = std::move(*frames);
-  }
-  return understood_program(files, reading);
+  return understood_program(files, {arguments.split, arguments.keep_joints, {}, files.system}, arguments.frames);
 }
 
 }  // namespace

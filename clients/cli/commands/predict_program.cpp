@@ -91,12 +91,7 @@ Result<Extent> predict_program(const PredictProgramArguments& arguments) {
   if (!files) return tl::make_unexpected(files.error());
   cam::ReadOptions reading;
   reading.split = true;  // nothing is written, so a point may be used in several ways
-  if (!arguments.frames.empty()) {
-    Result<std::map<std::string, Pose>> frames = read_frames_csv(arguments.frames);
-    if (!frames) return tl::make_unexpected(frames.error());
-    reading.frames = std::move(*frames);
-  }
-  const Result<cam::Program> program = understood_program(*files, reading);
+  const Result<cam::Program> program = understood_program(*files, reading, arguments.frames);
   if (!program) return tl::make_unexpected(program.error());
   const Result<cam::PredictedProgram> predicted =
       arguments.service.service ? predict_by_service(*program, arguments) : predict_here(*program, arguments);

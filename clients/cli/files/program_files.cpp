@@ -1,13 +1,18 @@
 #include "clients/cli/files/program_files.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <iterator>
 #include <set>
 
 #include "clients/cam/mark.h"
+#include "server/base/plain_text.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/measurement/files/csv_table.h"
@@ -24,6 +29,20 @@ struct Found {
   std::string name, path;
 };
 
+/// By its ending; `.dat` is KRL only where it looks like it, since FANUC's and Yaskawa's controllers have such files
+/// too.
+std::optional<cam::Dialect> dialect_of_found(const std::string& path) {
+  const auto dialect = cam::dialect_of_file(path);
+  const std::string ending = fs::path(path).extension().string();
+  if (dialect != cam::Dialect::kKrl || (ending != ".dat" && ending != ".DAT" && ending != ".Dat")) return dialect;
+  constexpr std::size_t kHead = 1 << 16;  // bytes
+  std::string head(kHead, ' ');
+  std::ifstream file(path, std::ios::binary);
+  head.resize(static_cast<std::size_t>(file.read(head.data(), kHead).gcount()));
+  for (char& c : head) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  return head.find("DEFDAT") == std::string::npos ? std::nullopt : dialect;
+}
+
 /// The programs of a folder, by name.
 std::vector<Found> programs_in(const std::string& folder, const std::optional<cam::Dialect>& wanted) {
   std::vector<Found> found;
@@ -31,7 +50,7 @@ std::vector<Found> programs_in(const std::string& folder, const std::optional<ca
   for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
     if (!it->is_regular_file(error)) continue;
     const std::string path = it->path().string();
-    const auto dialect = cam::dialect_of_file(path);
+    const auto dialect = dialect_of_found(path);
     if (dialect && (!wanted || dialect == wanted))
       found.push_back({fs::relative(it->path(), folder, error).string(), path});
   }
@@ -120,9 +139,96 @@ Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, 
   return program;
 }
 
-Result<cam::Program> understood_program(const ProgramFiles& files, const cam::ReadOptions& options) {
+namespace {
+
+/// A row of --frames.
+struct GivenPose {
+  std::string name;
+  Pose X;
+  int line = 0;
+  bool may_be_unused = false;  ///< it is for other programs
+};
+
+Result<bool> may_be_unused(const CsvTable& table, std::size_t row) {
+  const auto column = table.find("may_be_unused");
+  const std::string said = column ? table.field(row, *column) : "no";
+  if (said == "yes" || said == "no") return said == "yes";
+  return table.refuse(row, "may_be_unused is {}, expected yes or no", shown_short(said)).of("may_be_unused");
+}
+
+Result<std::vector<GivenPose>> read_frames_csv(const std::string& path) {
+  const Result<std::string> text = read_text_file(path);
+  if (!text) return tl::make_unexpected(text.error());
+  const Result<CsvTable> table = CsvTable::parse(*text, path);
+  if (!table) return tl::make_unexpected(table.error());
+  const Result<std::size_t> name = table->require("name");
+  if (!name) return tl::make_unexpected(name.error());
+  const auto columns = table->all_or_none({"x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"});
+  if (!columns) return tl::make_unexpected(columns.error());
+  if (columns->empty()) return refused("no columns x_mm,y_mm,z_mm,qw,qx,qy,qz").in(path).of("x_mm");
+  std::vector<GivenPose> rows;
+  std::set<std::string> names;
+  for (std::size_t row = 0; row < table->size(); ++row) {
+    Vector3 p;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Result<double> value = table->number(row, (*columns)[k], 1e6);
+      if (!value) return tl::make_unexpected(value.error());
+      p(static_cast<Eigen::Index>(k)) = from_mm(*value);
+    }
+    const Result<Matrix3> R = table->rotation(row, {columns->begin() + 3, columns->end()});
+    if (!R) return tl::make_unexpected(R.error());
+    const Result<bool> spare = may_be_unused(*table, row);
+    if (!spare) return tl::make_unexpected(spare.error());
+    rows.push_back({table->field(row, *name), make_pose(*R, p), table->line(row), *spare});
+    if (!names.insert(rows.back().name).second)
+      return table->refuse(row, "{} is there twice", shown_short(rows.back().name)).of("name");
+  }
+  return rows;
+}
+
+/// Refuses rows that do not reach the program: whoever wrote them believes that they do.
+Status check_used(const std::vector<GivenPose>& rows, const std::string& path, const cam::Program& program,
+                  cam::Dialect dialect) {
+  const cam::FramesRows known = cam::rows_of(program);
+  std::vector<Error> problems;
+  for (const GivenPose& row : rows) {
+    const bool spelled = cam::may_have_row(dialect, row.name);
+    // Behind what is left nobody looks for its frame.
+    const bool hidden = spelled && !program.left.empty() && known.open.empty();
+    if (row.may_be_unused || hidden || known.used.contains(row.name)) continue;
+    std::set<std::string> names = known.used;
+    names.insert(known.open.begin(), known.open.end());
+    problems.push_back(refused("{}: {}", shown_short(row.name),
+                               spelled ? "nothing in the program uses it"
+                                       : fmt::format("a {} program has no such name", cam::name_of(dialect)))
+                           .in(path)
+                           .at_row(row.line)
+                           .of("name")
+                           .with_text(row.name)
+                           .next(fmt::format("its names are: {}", shown(fmt::format("{}", fmt::join(names, ", ")))))
+                           .value());
+  }
+  if (!problems.empty()) return tl::make_unexpected(together(std::move(problems)));
+  return {};
+}
+
+}  // namespace
+
+Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOptions options,
+                                        const std::string& frames) {
+  std::vector<GivenPose> rows;
+  if (!frames.empty()) {
+    Result<std::vector<GivenPose>> given = read_frames_csv(frames);
+    if (!given) return tl::make_unexpected(given.error());
+    rows = std::move(*given);
+  }
+  for (const GivenPose& row : rows) options.frames.emplace(row.name, row.X);
   cam::Program program = cam::read_program(files.dialect, files.files, options);
-  if (program.is_understood()) return program;
+  if (program.is_understood()) {
+    if (const Status used = check_used(rows, frames, program, files.dialect); !used)
+      return tl::make_unexpected(used.error());
+    return program;
+  }
   const bool is_empty = std::all_of(files.files.begin(), files.files.end(),
                                     [](const cam::SourceFile& file) { return file.text.empty(); });
   const std::string where = files.paths.front() == "-" ? "standard input" : files.paths.front();
@@ -153,32 +259,6 @@ Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all) {
   }
   if (!any && !all) return refused("no mark of a correction").in(program.paths.front()).next("it is as it was");
   return before;
-}
-
-Result<std::map<std::string, Pose>> read_frames_csv(const std::string& path) {
-  const Result<std::string> text = read_text_file(path);
-  if (!text) return tl::make_unexpected(text.error());
-  const Result<CsvTable> table = CsvTable::parse(*text, path);
-  if (!table) return tl::make_unexpected(table.error());
-  const Result<std::size_t> name = table->require("name");
-  if (!name) return tl::make_unexpected(name.error());
-  const auto columns = table->all_or_none({"x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"});
-  if (!columns) return tl::make_unexpected(columns.error());
-  if (columns->empty()) return refused("no columns x_mm,y_mm,z_mm,qw,qx,qy,qz").in(path).of("x_mm");
-  std::map<std::string, Pose> frames;
-  for (std::size_t row = 0; row < table->size(); ++row) {
-    Vector3 p;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Result<double> value = table->number(row, (*columns)[k], 1e6);
-      if (!value) return tl::make_unexpected(value.error());
-      p(static_cast<Eigen::Index>(k)) = from_mm(*value);
-    }
-    const Result<Matrix3> R = table->rotation(row, {columns->begin() + 3, columns->end()});
-    if (!R) return tl::make_unexpected(R.error());
-    if (!frames.emplace(table->field(row, *name), make_pose(*R, p)).second)
-      return table->refuse(row, "{} is there twice", table->field(row, *name)).of("name");
-  }
-  return frames;
 }
 
 Result<std::vector<std::string>> output_paths(const ProgramFiles& program, const std::string& output) {

@@ -29,16 +29,16 @@ struct ProgramFiles {
 [[nodiscard]] Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs,
                                                       const std::string& format);
 
-/// What cam::read_program() makes of the files. Refuses a program without a single motion or target in any of them.
-[[nodiscard]] Result<cam::Program> understood_program(const ProgramFiles& files, const cam::ReadOptions& options);
+/// What cam::read_program() makes of the files. `frames`: values of tools and frames that they leave open, or empty
+/// (CSV: `name,x_mm,y_mm,z_mm,qw,qx,qy,qz`; frames seen from the robot's base, tools from the flange). Refuses a
+/// program without a single motion or target in any of them, and rows of `frames` that nothing uses, unless their
+/// column `may_be_unused` says yes.
+[[nodiscard]] Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOptions options,
+                                                      const std::string& frames);
 
 /// Of a program that is marked as corrected: each file as it was before. Refuses a file whose original is not kept
 /// beside it, or is not the one that the mark names. `all`: also where no file is marked, as for a new correction.
 [[nodiscard]] Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all);
-
-/// Values of tools and frames that a program leaves open (CSV: `name,x_mm,y_mm,z_mm,qw,qx,qy,qz`; frames seen from the
-/// robot's base, tools from the flange).
-[[nodiscard]] Result<std::map<std::string, Pose>> read_frames_csv(const std::string& path);
 
 /// Where each file goes: `output` itself for a single file, else into the folder of that name. Refuses to write over
 /// an input.

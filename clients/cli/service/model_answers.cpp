@@ -4,7 +4,9 @@
 
 namespace trammel::cli {
 
-cam::CellTools tools_of(const CompensatedModel& model) { return {model.parts().physics.tools, model.cell().payloads}; }
+cam::CellTools tools_of(const CompensatedModel& model) {
+  return {model.parts().physics.tools, model.cell().payloads, model.cell().X_WB};
+}
 
 Result<ToolAndPayload> known_tool_and_payload(const CompensatedModel& model, const std::string& tool,
                                               const std::string& payload) {

@@ -1,0 +1,198 @@
+#include "clients/cam/stated_robot.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+
+#include "server/base/plain_text.h"
+#include "server/base/units.h"
+#include "server/robot/inverse_kinematics.h"
+
+namespace trammel::cam {
+
+namespace {
+
+constexpr double kSamePlace = 1e-5;   // m
+constexpr double kSameTurn = 9e-5;    // rad, 0.005 deg
+constexpr double kSameLength = 1e-4;  // m: both are the drawing's
+constexpr std::size_t kFewest = 3;    // digits of a reach: R2700, R900
+
+bool same_base(const Pose& a, const Pose& b) {
+  return (a.translation() - b.translation()).norm() <= kSamePlace &&
+         pose_difference(a, b).tail<3>().norm() <= kSameTurn;
+}
+
+std::string place_of(const StatedBase& base) {
+  return base.line == 0 ? fmt::format("{} of {}", base.name, base.file)
+                        : fmt::format("{} ({} line {})", base.name, base.file, base.line);
+}
+
+/// The turning axes alone, as they stand on a rail; empty: no chain of their own.
+std::optional<Chain> arm_of(const Chain& robot) {
+  std::vector<Joint> turning;
+  for (int j = 0; j < robot.size(); ++j) {
+    if (robot.joint(j).type == JointType::kRevolute) turning.push_back(robot.joint(j));
+  }
+  Result<Chain> arm = Chain::make(robot.name(), std::move(turning));
+  return arm ? std::optional<Chain>(std::move(*arm)) : std::nullopt;
+}
+
+/// Of the robot file; empty: such an arm has no such number.
+std::optional<double> number_of(ArmNumber number, const Chain& robot) {
+  const std::optional<Chain> arm = arm_of(robot);
+  if (!arm) return std::nullopt;
+  if (number == ArmNumber::kAxes) return arm->size();
+  const bool on_rail = arm->size() != robot.size();
+  if (!has_spherical_wrist(*arm) || (on_rail && number == ArmNumber::kHeightOfAxis2)) return std::nullopt;
+  const auto link = [&](int j) { return arm->joint(j).link; };
+  switch (number) {
+    case ArmNumber::kHeightOfAxis2:
+      return link(0).d;
+    case ArmNumber::kAxis1ToAxis2:
+      return std::abs(link(0).a);
+    case ArmNumber::kAxis2ToAxis3:
+      return std::abs(link(1).a);
+    case ArmNumber::kAxis3ToWrist:
+      return std::hypot(link(2).a, link(3).d);
+    case ArmNumber::kWristToFlange:
+      return std::abs(link(5).d);
+    case ArmNumber::kAxes:
+      break;
+  }
+  return std::nullopt;
+}
+
+const char* words_for(ArmNumber number) {
+  switch (number) {
+    case ArmNumber::kHeightOfAxis2:
+      return "from the base up to axis 2";
+    case ArmNumber::kAxis1ToAxis2:
+      return "from axis 1 to axis 2";
+    case ArmNumber::kAxis2ToAxis3:
+      return "from axis 2 to axis 3";
+    case ArmNumber::kAxis3ToWrist:
+      return "from axis 3 to the wrist";
+    case ArmNumber::kWristToFlange:
+      return "from the wrist to the flange";
+    case ArmNumber::kAxes:
+      break;
+  }
+  return "turning axes";
+}
+
+std::optional<Error> contradiction(const StatedNumber& stated, const Chain& robot) {
+  const std::optional<double> ours = number_of(stated.of, robot);
+  if (!ours) return std::nullopt;
+  if (stated.of == ArmNumber::kAxes) {
+    if (stated.value == *ours) return std::nullopt;
+    return refused("{} says {:g} {}, the robot file of {} has {:g}", stated.name, stated.value, words_for(stated.of),
+                   shown(robot.name()), *ours)
+        .in(stated.file)
+        .at_row(stated.line)
+        .of(stated.name)
+        .beyond(stated.value, *ours)
+        .value();
+  }
+  const double apart = std::abs(std::abs(stated.value) - std::abs(*ours));
+  if (apart <= kSameLength) return std::nullopt;
+  return refused("{} says {:.3f} mm {}, the robot file of {} has {:.3f} mm: {:.3f} mm apart", stated.name,
+                 to_mm(stated.value), words_for(stated.of), shown(robot.name()), to_mm(*ours), to_mm(apart))
+      .in(stated.file)
+      .at_row(stated.line)
+      .of(stated.name)
+      .beyond(to_mm(stated.value), to_mm(*ours))
+      .next("correct with the model of the robot that this controller moves")
+      .value();
+}
+
+/// The digits behind `letters`: 210 of `KR 210 R2700` behind `KR`, 2700 behind `R`.
+std::string digits_behind(const std::string& type, const std::string& letters, std::size_t fewest) {
+  for (std::size_t at = type.find(letters); at != std::string::npos; at = type.find(letters, at + 1)) {
+    const std::size_t first = std::min(type.find_first_not_of(" _-", at + letters.size()), type.size());
+    const std::size_t end = std::min(type.find_first_not_of("0123456789", first), type.size());
+    const bool whole = at == 0 || std::isalpha(static_cast<unsigned char>(type[at - 1])) == 0;
+    if (whole && end - first >= fewest) return type.substr(first, end - first);
+  }
+  return "";
+}
+
+std::string upper(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
+  return text;
+}
+
+/// KUKA's types say load and reach, KR 210 R2700. Words beside them are spelled in many ways.
+std::optional<Error> contradiction(const StatedType& stated, const Chain& robot) {
+  const std::string theirs = upper(stated.type), ours = upper(robot.name());
+  const auto differ = [&](const std::string& letters, std::size_t fewest) {
+    const std::string a = digits_behind(theirs, letters, fewest), b = digits_behind(ours, letters, fewest);
+    return !a.empty() && !b.empty() && a != b;
+  };
+  if (!differ("KR", 1) && !differ("R", kFewest)) return std::nullopt;
+  return refused("{} says {}, the robot file is of {}", stated.name, shown(stated.type), shown(robot.name()))
+      .in(stated.file)
+      .at_row(stated.line)
+      .of(stated.name)
+      .with_text(stated.type)
+      .next("correct with the model of the robot that this controller moves")
+      .value();
+}
+
+}  // namespace
+
+void stand_in_world(Program& program, const ReadOptions& options) {
+  if (const auto row = options.frames.find(kRobotBase); row != options.frames.end())
+    program.bases.insert(program.bases.begin(), {row->second, kRobotBase, "--frames", 0});
+  if (program.bases.empty()) return;
+  const Pose X_BW = program.bases.front().X_WB.inverse();
+  for (ProgramFrame& frame : program.frames) {
+    if (!frame.in_base) frame.X_BO = X_BW * frame.X_BO;
+  }
+}
+
+Status check_stated_robot(const Program& program, const Chain& robot) {
+  std::vector<Error> problems;
+  for (const StatedBase& base : program.bases) {
+    const StatedBase& first = program.bases.front();
+    if (same_base(base.X_WB, first.X_WB)) continue;
+    Failure two =
+        refused("the robot stands at {} in the controller's world by {}, at {} by {}: {}", pose_text(first.X_WB),
+                place_of(first), pose_text(base.X_WB), place_of(base), apart_text(first.X_WB, base.X_WB))
+            .in(base.file)
+            .of(base.name)
+            .next("mend the one that is wrong");
+    if (base.line > 0) two.value().row = base.line;
+    problems.push_back(two.value());
+  }
+  const auto add = [&](std::optional<Error> error) {
+    if (error) problems.push_back(std::move(*error));
+  };
+  for (const StatedNumber& number : program.numbers) add(contradiction(number, robot));
+  for (const StatedType& type : program.types) add(contradiction(type, robot));
+  if (!problems.empty()) return tl::make_unexpected(together(std::move(problems)));
+  return {};
+}
+
+std::vector<std::string> notes_on_base(const Program& program, const CellTools& cell) {
+  if (program.bases.empty() || same_base(program.bases.front().X_WB, Pose::Identity())) return {};
+  const StatedBase& base = program.bases.front();
+  std::string stands =
+      fmt::format("the robot stands at {} in the controller's world, by {}: targets are taken from there",
+                  pose_text(base.X_WB), place_of(base));
+  if (cell.X_WB && !same_base(*cell.X_WB, base.X_WB))
+    stands += fmt::format("; the cell's base, {}, is seen from its measuring system", pose_text(*cell.X_WB));
+  std::vector<std::string> notes = {stands};
+  std::vector<std::string> rows;
+  for (const ProgramFrame& frame : program.frames) {
+    if (frame.in_base && !frame.row.empty()) rows.push_back(shown(frame.row));
+  }
+  if (!rows.empty())
+    notes.push_back(fmt::format("{} of --frames: taken as seen from the robot's base, not from the controller's world",
+                                fmt::join(rows, ", ")));
+  return notes;
+}
+
+}  // namespace trammel::cam

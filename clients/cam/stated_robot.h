@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "clients/cam/cell_tools.h"
+#include "clients/cam/program.h"
+
+/// What the files of a controller say of the robot itself: where it stands, and which one it is.
+namespace trammel::cam {
+
+/// Makes the frames of a program seen from the robot's base: by a row `robot_base` of --frames, else by what the files
+/// say; where nobody says anything the controller's world is the base.
+void stand_in_world(Program& program, const ReadOptions& options);
+
+/// Refuses two places that stand the robot differently, and lengths, axes or a type that are not those of `robot`, each
+/// with both places and values.
+[[nodiscard]] Status check_stated_robot(const Program& program, const Chain& robot);
+
+/// Where the robot was taken to stand, where that is not the origin of the controller's world; a sentence each.
+[[nodiscard]] std::vector<std::string> notes_on_base(const Program& program, const CellTools& cell);
+
+}  // namespace trammel::cam
