@@ -183,7 +183,8 @@ void add_receipts(const Corrected& done, const CorrectProgramArguments& argument
 }
 
 Result<cam::Program> read(const ProgramFiles& files, const CorrectProgramArguments& arguments) {
-  return understood_program(files, {arguments.split, arguments.keep_joints, {}, files.system}, arguments.frames);
+  return understood_program(files, {arguments.split, arguments.keep_joints, {}, files.system, arguments.idle_axes},
+                            arguments.frames);
 }
 
 }  // namespace

@@ -17,6 +17,7 @@ struct CorrectProgramArguments {
        keep_joints = false;
   double tolerance_mm = 0;  ///< 0: none
   ServiceOptions service;
+  std::vector<std::string> idle_axes = {};
 };
 
 [[nodiscard]] Result<Extent> correct_program(const CorrectProgramArguments& arguments);

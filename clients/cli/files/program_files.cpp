@@ -224,6 +224,8 @@ Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOpti
   }
   for (const GivenPose& row : rows) options.frames.emplace(row.name, row.X);
   cam::Program program = cam::read_program(files.dialect, files.files, options);
+  if (const Status idle = cam::take_idle_axes(program, options.idle_axes); !idle)
+    return tl::make_unexpected(idle.error());
   if (program.is_understood()) {
     if (const Status used = check_used(rows, frames, program, files.dialect); !used)
       return tl::make_unexpected(used.error());
