@@ -191,7 +191,14 @@ struct MarkPlace {
   bool a_line_each = false;  ///< for each word of the mark
 };
 
-struct Program {
+/// What the controller's own files say of the robot.
+struct StatedRobot {
+  std::vector<StatedBase> bases;  ///< the first holds
+  std::vector<StatedNumber> numbers;
+  std::vector<StatedType> types;
+};
+
+struct Program : StatedRobot {
   std::string dialect;
   std::vector<SourceFile> files;
   std::vector<MarkPlace> mark_places;  ///< one a file
@@ -201,10 +208,7 @@ struct Program {
   std::vector<LeftAlone> left;
   std::vector<ProgramMove> moves;
   std::vector<Reading> readings;
-  std::vector<StatedBase> bases;      ///< the first holds
-  std::vector<StatedNumber> numbers;  ///< of the robot
-  std::vector<StatedType> types;      ///< of the robot
-  std::vector<std::string> notes;     ///< what could not be compared, a sentence each
+  std::vector<std::string> notes;  ///< what could not be compared, a sentence each
 
   /// Whether any motion or target was seen in any of the files, be it one that is left as it is.
   [[nodiscard]] bool is_understood() const { return !(moves.empty() && targets.empty() && left.empty()); }
@@ -216,6 +220,7 @@ struct ReadOptions {
   std::map<std::string, Pose> frames = {};  ///< values of tools and frames that the files leave open, by name
   std::set<std::string> spared = {};        ///< files that are read and not written
   std::vector<std::string> idle_axes = {};  ///< external axes that carry neither robot nor part, by axis_called()
+  StatedRobot stated = {};                  ///< by files that are no programs
 };
 
 /// The row of --frames that tells where the robot stands in the world that the program's frames are told in.

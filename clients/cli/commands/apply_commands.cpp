@@ -185,7 +185,7 @@ Result<Corrections> correct_by_service(const TargetFile& file, const ApplyArgume
 /// What correct is asked for, a program or a table of targets.
 struct CorrectArguments : ApplyArguments {
   std::vector<std::string> inputs;
-  std::string receipt, report, format, frames;
+  std::string receipt, report, format, frames, task;
   std::vector<std::string> idle_axes;
   bool allow_failed = false, strict = false, keep_digits = false, undo = false, again = false, split = false,
        keep_joints = false;
@@ -202,6 +202,7 @@ Status check_table_usage(const CorrectArguments& arguments) {
   const std::pair<bool, const char*> of_programs[] = {{!arguments.report.empty(), "--report"},
                                                       {!arguments.frames.empty(), "--frames"},
                                                       {!arguments.idle_axes.empty(), "--idle-axis"},
+                                                      {!arguments.task.empty(), "--task"},
                                                       {arguments.split, "--split"},
                                                       {arguments.keep_digits, "--keep-digits"},
                                                       {arguments.keep_joints, "--keep-joints"},
@@ -284,7 +285,7 @@ CLI::Option* add_apply_options(CLI::App& command, ApplyArguments& arguments) {
 
 /// How a program is read.
 void add_reading_options(CLI::App& command, std::string& format, std::string& frames,
-                         std::vector<std::string>& idle_axes) {
+                         std::vector<std::string>& idle_axes, std::string& task) {
   const std::string group = "Programs";
   command
       .add_option("--format", format,
@@ -303,16 +304,21 @@ void add_reading_options(CLI::App& command, std::string& format, std::string& fr
                   "give it: 'group 2, axis 1'; may be given several times")
       ->allow_extra_args(false)
       ->group(group);
+  command
+      .add_option("--task", task,
+                  "Of the backup of an ABB controller that moves several robots: the task whose modules are taken, and "
+                  "whose robot (TASK2)")
+      ->group(group);
 }
 
 /// What predict is asked for: joints, or a program.
 struct PredictArguments : ApplyArguments {
   std::vector<std::string> inputs;
-  std::string format, frames;
+  std::string format, frames, task;
   std::vector<std::string> idle_axes;
 
   [[nodiscard]] PredictProgramArguments of_program() const {
-    return {inputs, model, tool, payload, format, output, json, frames, service, idle_axes};
+    return {inputs, model, tool, payload, format, output, json, frames, service, idle_axes, task};
   }
 };
 
@@ -355,7 +361,7 @@ void add_predict(CLI::App& app, Action& chosen) {
       "--orientation", arguments->orientation,
       "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...); with a model "
       "file only");
-  add_reading_options(*command, arguments->format, arguments->frames, arguments->idle_axes);
+  add_reading_options(*command, arguments->format, arguments->frames, arguments->idle_axes, arguments->task);
   add_apply_options(*command, *arguments)->required();
   command->callback([arguments, &chosen] {
     chosen = [arguments]() -> Result<Extent> {
@@ -369,7 +375,7 @@ void add_predict(CLI::App& app, Action& chosen) {
 
 void add_program_options(CLI::App& command, CorrectArguments& arguments) {
   const std::string group = "Programs";
-  add_reading_options(command, arguments.format, arguments.frames, arguments.idle_axes);
+  add_reading_options(command, arguments.format, arguments.frames, arguments.idle_axes, arguments.task);
   command.add_option("--report", arguments.report, "The receipt as a page, with the path in 3D (HTML)")->group(group);
   command
       .add_flag("--keep-digits", arguments.keep_digits,

@@ -190,7 +190,7 @@ Result<cam::Program> read(const ProgramFiles& files, const CorrectProgramArgumen
 }  // namespace
 
 Result<Extent> correct_program(const CorrectProgramArguments& arguments) {
-  Result<ProgramFiles> files = read_program_files(arguments.inputs, arguments.format);
+  Result<ProgramFiles> files = read_program_files(arguments.inputs, arguments.format, arguments.task);
   if (!files) return tl::make_unexpected(files.error());
   if (arguments.undo) return undo(*files, arguments);
   if (arguments.again) files = originals_of(*files, true);
