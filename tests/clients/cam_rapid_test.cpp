@@ -457,5 +457,39 @@ TEST(Rapid, MotionsOfAToolThatTheModelHasNotLearnedWithAreLeft) {
   EXPECT_NE(why(made, "p20").find("not trained with gripper"), std::string::npos) << why(made, "p20");
 }
 
+/// A program as planning software posts it: what a tool and a work object are is assigned before the motions.
+std::string posted(const std::string& motions) {
+  return "MODULE M\n  LOCAL PERS tooldata tOlp:=[TRUE,[[0,0,0],[1,0,0,0]],[100,[0,0,100],[1,0,0,0],0,0,0]];\n"
+         "  LOCAL PERS wobjdata wOlp:=[FALSE,TRUE,\"\",[[0,0,0],[1,0,0,0]],[[300,-250,300],[1,0,0,0]]];\n" +
+         target("p10", "0,125,400") + target("p20", "0,125,410") + "  PROC main()\n" + motions +
+         "  ENDPROC\nENDMODULE\n";
+}
+const std::string kSetTool = "    tOlp.tframe:=[[100,0,150],[0.923879533,0,-0.382683432,0]];\n";
+std::string to(const std::string& point) { return "    MoveL " + point + ",v100,fine,tOlp\\WObj:=wOlp;\n"; }
+
+TEST(Rapid, ConstantsThatAreAssignedToToolsAndWorkObjectsHoldUntilTheNext) {
+  const test::Corrected made = rapid(posted(kSetTool + "    wOlp.uframe.trans:=[1500,0,500];\n" + to("p10") +
+                                            "    wOlp.uframe:=[[1490,0,500],[1,0,0,0]];\n" + to("p20")));
+  ASSERT_EQ(made.refusal, "");
+  EXPECT_EQ(made.program.left_alone(), 0u) << why(made, "p10");
+  EXPECT_LT((row_of(made.program, "p10").p_B - Vector3(1.8, -.125, 1.2)).norm(), 1e-12);
+  EXPECT_LT((row_of(made.program, "p20").p_B - Vector3(1.79, -.125, 1.21)).norm(), 1e-12);
+}
+
+TEST(Rapid, AnAssignmentThatABranchDecidesOrThatIsNotConstantLeavesItsMotions) {
+  const std::string frame = "    wOlp.uframe:=[[1500,0,500],[1,0,0,0]];\n";
+  const test::Corrected branch = rapid(posted(kSetTool + frame + to("p10") +
+                                              "    IF di1=1 THEN\n      wOlp.uframe:=[[1490,0,"
+                                              "500],[1,0,0,0]];\n    ENDIF\n" +
+                                              to("p20")));
+  EXPECT_TRUE(row_of(branch.program, "p10").corrected()) << branch.refusal << why(branch, "p10");
+  EXPECT_NE(why(branch, "p20").find("wOlp is set at run time"), std::string::npos) << why(branch, "p20");
+  const test::Corrected number = rapid(posted(kSetTool + frame + "    wOlp.uframe.trans.x:=reg1;\n" + to("p10")));
+  EXPECT_FALSE(row_of(number.program, "p10").corrected());
+  const test::Corrected before = rapid(posted(kSetTool + to("p10") + frame + to("p20")));
+  EXPECT_FALSE(row_of(before.program, "p10").corrected()) << "the end of main comes before its head, too";
+  EXPECT_TRUE(row_of(before.program, "p20").corrected()) << why(before, "p20");
+}
+
 }  // namespace
 }  // namespace trammel::cam

@@ -155,7 +155,8 @@ class Reader {
   /// An instruction, or a word that decides the order.
   struct Place {
     std::size_t module = 0;
-    const Instruction* instruction = nullptr;  ///< nullptr: a word
+    const Instruction* instruction = nullptr;  ///< nullptr: a word, or an assignment
+    const Assignment* assignment = nullptr;
   };
 
   /// The statements of all modules in a row.
@@ -166,18 +167,29 @@ class Reader {
       all.second.push_back(place);
     };
     for (std::size_t m = 0; m < modules_.size(); ++m) {
-      auto turn = modules_[m].turns.begin();
+      std::size_t turn = 0, assigned = 0;
+      const std::vector<Turn>& turns = modules_[m].turns;
+      const std::vector<Assignment>& assignments = modules_[m].assignments;
       const auto add_turns = [&](std::size_t before) {
-        for (; turn != modules_[m].turns.end() && turn->before <= before; ++turn) {
-          Step step = turn->step;
-          if (step.kind == Step::Kind::kRoutine) step.label = fmt::format("{}:{}", m, step.label);
-          add(std::move(step), {m, nullptr});
+        for (;;) {
+          if (assigned < assignments.size() && assignments[assigned].before <= before &&
+              assignments[assigned].turns <= turn) {
+            if (meaning_->sets(assignments[assigned]))
+              add({Step::Kind::kPlain, "", true}, {m, nullptr, &assignments[assigned]});
+            ++assigned;
+          } else if (turn < turns.size() && turns[turn].before <= before) {
+            Step step = turns[turn++].step;
+            if (step.kind == Step::Kind::kRoutine) step.label = fmt::format("{}:{}", m, step.label);
+            add(std::move(step), {m});
+          } else {
+            return;
+          }
         }
       };
       const std::vector<Instruction>& instructions = modules_[m].instructions;
       for (std::size_t i = 0; i < instructions.size(); ++i) {
         add_turns(i);
-        add(step_of(m, instructions[i]), {m, &instructions[i]});
+        add(step_of(m, instructions[i]), {m, &instructions[i], nullptr});
       }
       add_turns(instructions.size());
     }
@@ -206,11 +218,17 @@ class Reader {
     std::size_t load = 0;                         ///< as tools_ numbers them; 0: the tool's own
     std::size_t displaced = 0;                    ///< of displacements_; 0: none
     std::size_t external_displaced = 0;           ///< the same
+    std::size_t settings = 0;                     ///< of settings_
     Confs lines = Confs::kOn, axes = Confs::kOn;  ///< ConfL, ConfJ
     bool operator==(const State&) const = default;
   };
 
   void set(const Place& place, State& state) {
+    if (place.assignment != nullptr) {
+      Settings settings = *settings_[state.settings];
+      meaning_->set(*place.assignment, settings);
+      state.settings = known_settings(std::move(settings));
+    }
     if (place.instruction == nullptr) return;
     const Instruction& instruction = *place.instruction;
     if (instruction.name == "gripload") state.load = tools_->load_set(place.module, instruction);
@@ -222,6 +240,27 @@ class Reader {
     if (displaces_external(instruction))
       state.external_displaced = known_displacement(displacement(place.module, instruction));
   }
+  std::size_t known_settings(Settings settings) {
+    const auto [known, fresh] = settings_at_.emplace(std::move(settings), settings_.size());
+    if (fresh) settings_.push_back(&known->first);
+    return known->second;
+  }
+  /// What holds on both ways; nullptr where they differ.
+  static Settings on_both_ways(const Settings& one, const Settings& other) {
+    Settings both;
+    for (const Settings* settings : {&one, &other}) {
+      const Settings& beside = settings == &one ? other : one;
+      for (const auto& [of, parts] : *settings) {
+        const auto there = beside.find(of);
+        for (const auto& [fields, assignment] : parts) {
+          const auto same = there == beside.end() ? parts.end() : there->second.find(fields);
+          const bool agrees = there != beside.end() && same != there->second.end() && same->second == assignment;
+          both[of][fields] = agrees ? assignment : nullptr;
+        }
+      }
+    }
+    return both;
+  }
   static Confs confs_of(const Instruction& instruction) {
     const bool off = std::any_of(instruction.arguments.begin(), instruction.arguments.end(),
                                  [](const Expression& argument) { return argument.label == "off"; });
@@ -230,6 +269,8 @@ class Reader {
   void join(State& state, const State& other, const std::string& by) {
     state.displaced = std::max(state.displaced, other.displaced);
     state.external_displaced = std::max(state.external_displaced, other.external_displaced);
+    if (state.settings != other.settings)
+      state.settings = known_settings(on_both_ways(*settings_[state.settings], *settings_[other.settings]));
     if (state.lines != other.lines) state.lines = Confs::kUndecided;
     if (state.axes != other.axes) state.axes = Confs::kUndecided;
     if (state.load == other.load) return;
@@ -254,6 +295,7 @@ class Reader {
       move_of.emplace(s, program_.moves.size());
       program_.moves.push_back({module, motion->line, {}, is_arc(motion->name)});
       state_ = states[s];
+      meaning_->assume(*settings_[state_.settings]);
       note_confs(module, *motion);
       read_motion(module, *motion);
     }
@@ -752,6 +794,8 @@ class Reader {
   std::set<std::string> named_;
   std::string open_displacement_;
   std::vector<std::string> displacements_ = std::vector<std::string>(1);
+  std::map<Settings, std::size_t> settings_at_ = {{{}, 0}};
+  std::vector<const Settings*> settings_ = {&settings_at_.begin()->first};
   State state_;  ///< of the motion that is read
   bool calls_routine_ = false, moves_ = false;
   bool goes_by_joints_before_ = false, undecided_confs_ = false;
