@@ -486,6 +486,11 @@ TEST(Rapid, AnAssignmentThatABranchDecidesOrThatIsNotConstantLeavesItsMotions) {
   EXPECT_NE(why(branch, "p20").find("wOlp is set at run time"), std::string::npos) << why(branch, "p20");
   const test::Corrected number = rapid(posted(kSetTool + frame + "    wOlp.uframe.trans.x:=reg1;\n" + to("p10")));
   EXPECT_FALSE(row_of(number.program, "p10").corrected());
+  const test::Corrected function = rapid(
+      posted(kSetTool + frame + "    ok:=set();\n" + to("p10") +
+             "  ENDPROC\n  FUNC bool set()\n    wOlp.uframe:=[[1490,0,500],[1,0,0,0]];\n    RETURN TRUE;\n  ENDFUNC\n"
+             "  PROC other()\n"));
+  EXPECT_FALSE(row_of(function.program, "p10").corrected()) << "the function comes in before the motion";
   const test::Corrected before = rapid(posted(kSetTool + to("p10") + frame + to("p20")));
   EXPECT_FALSE(row_of(before.program, "p10").corrected()) << "the end of main comes before its head, too";
   EXPECT_TRUE(row_of(before.program, "p20").corrected()) << why(before, "p20");

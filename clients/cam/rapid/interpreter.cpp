@@ -228,6 +228,9 @@ std::optional<Interpreter::Part> Interpreter::constant_part(const Assignment& as
   if (!found || found->module != module || !is_literal(assignment.value)) return std::nullopt;
   const Declaration& declared = *found->declaration;
   const bool is_setting = declared.type == "tooldata" || declared.type == "wobjdata";
+  // A function comes in within expressions, whose order is not followed.
+  if (assignment.routine >= 0 && modules_[module].routines[static_cast<std::size_t>(assignment.routine)].is_function)
+    return std::nullopt;
   if (!is_setting || declared.is_array || (declared.storage != Storage::kPers && declared.storage != Storage::kVar))
     return std::nullopt;
   auto fields = fields_of(assignment.target, declared.type, module);

@@ -208,6 +208,7 @@ class Parser {
     const std::string spelled(bytes());
     routine.name = take_word();
     routine.local = local;
+    routine.is_function = kind == "func";
     routine_ = static_cast<int>(module_.routines.size());
     if (kind == "trap")
       turn(Step::Kind::kInterrupt, fmt::format("the TRAP {}", shown(spelled)));

@@ -115,6 +115,7 @@ struct Instruction {
 struct Routine {
   std::string name;
   bool local = false;
+  bool is_function = false;
   std::vector<std::string> parameters;  ///< in order, those with `\` left out
 };
 
