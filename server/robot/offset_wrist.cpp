@@ -59,12 +59,10 @@ std::optional<JointVector> joints_of_offset_wrist(const Chain& chain, const Pose
   const Matrix3 R_B1 = about_z(theta[0]) * about_x(link(0).alpha);
   const Vector3 parallel_B = R_B1.col(2);
 
-  const std::optional<double> bent = arc_cosine(-s4 * s5 * R_B6.col(2).dot(parallel_B));
-  if (!bent) return std::nullopt;
-  theta[4] = (branch & 1) != 0 ? -*bent : *bent;
   // Seen in frame 6 the parallel axes are (cos 6 sin 5, -sin 6 sin 5, -s5 cos 5), times s4.
   const Vector3 parallel_6 = s4 * (R_B6.transpose() * parallel_B);
-  const double sine_5 = std::sin(theta[4]);
+  const double sine_5 = ((branch & 1) != 0 ? -1 : 1) * std::hypot(parallel_6.x(), parallel_6.y());
+  theta[4] = std::atan2(sine_5, -s5 * parallel_6.z());
   theta[5] = std::abs(sine_5) < kTolerance ? (chain.transmission() * near)(5) + link(5).theta
                                            : std::atan2(-parallel_6.y() / sine_5, parallel_6.x() / sine_5);
 

@@ -394,10 +394,17 @@ TEST(Rapid, NamesAreSpelledAsTheProgramSpellsThemAndOptionalArgumentsAreFollowed
 }
 
 TEST(Rapid, TheToolOfAMotionThatSetsASignalStandsBehindItsZone) {
-  const test::Corrected made = rapid(program(target("p10", "0,125,400") + target("p20", "0,125,410"),
-                                             "    MoveLDO p10,v100,fine,tSpindle\\WObj:=wPanel,doVacuum,1;\n"
-                                             "    MoveCSync p10,p20,v100,fine,tSpindle\\WObj:=wPanel,\"proc\";\n"));
+  CorrectProgramOptions options;
+  options.tool = "spindle";
+  const test::Corrected made = rapid("MODULE M\n" + kPanel + target("p10", "0,125,400") + target("p20", "0,125,410") +
+                                         "  PROC main()\n    MoveLDO p10,v100,fine,tHand\\WObj:=wPanel,doVacuum,1;\n"
+                                         "    MoveCSync p10,p20,v100,fine,tHand\\WObj:=wPanel,\"proc\";\n"
+                                         "  ENDPROC\nENDMODULE\n",
+                                     {}, options);
+  ASSERT_EQ(made.refusal, "");
   EXPECT_EQ(made.program.left_alone(), 0u) << why(made, "p10") << why(made, "p20");
+  EXPECT_NE(made.program.notes.at(0).find("tool tHand is not in the files"), std::string::npos)
+      << made.program.notes[0];
 }
 
 TEST(Rapid, WhereExternalAxesAreDisplacedTargetsThatHaveThemAreLeft) {
@@ -468,8 +475,9 @@ const std::string kSetTool = "    tOlp.tframe:=[[100,0,150],[0.923879533,0,-0.38
 std::string to(const std::string& point) { return "    MoveL " + point + ",v100,fine,tOlp\\WObj:=wOlp;\n"; }
 
 TEST(Rapid, ConstantsThatAreAssignedToToolsAndWorkObjectsHoldUntilTheNext) {
-  const test::Corrected made = rapid(posted(kSetTool + "    wOlp.uframe.trans:=[1500,0,500];\n" + to("p10") +
-                                            "    wOlp.uframe:=[[1490,0,500],[1,0,0,0]];\n" + to("p20")));
+  const test::Corrected made =
+      rapid(posted(kSetTool + "    wOlp.uframe:=[[1400,0,500],[1,0,0,0]];\n    wOlp.uframe.trans:=[1500,0,500];\n" +
+                   to("p10") + "    wOlp.uframe:=[[1490,0,500],[1,0,0,0]];\n" + to("p20")));
   ASSERT_EQ(made.refusal, "");
   EXPECT_EQ(made.program.left_alone(), 0u) << why(made, "p10");
   EXPECT_LT((row_of(made.program, "p10").p_B - Vector3(1.8, -.125, 1.2)).norm(), 1e-12);
