@@ -72,6 +72,10 @@ class Choosing {
       if (uses[k] == ToolUse::kNone) continue;
       choices[k] = uses[k] == ToolUse::kJoints ? choice_of_the_cell(program_.tools[k]) : choice(program_.tools[k]);
       if (choices[k].why_not.empty()) choose_payload(program_.tools[k], choices[k]);
+      if (choices[k].why_not.empty() && cell_.check_known) {
+        const Status known = cell_.check_known(choices[k].tool, choices[k].payload);
+        if (!known) choices[k].why_not = sentence(known.error());
+      }
       any |= choices[k].why_not.empty();
     }
     // Where no tool is the cell's, the program is not of this cell.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -15,6 +16,8 @@ struct CellTools {
   std::map<std::string, Pose> tools;  ///< X_FT
   std::map<std::string, Payload> payloads;
   std::optional<Pose> X_WB = {};  ///< the cell's base, seen from its measuring system; empty: found from the data
+  /// Refuses a tool and payload that the model has not learned with; empty: it knows all.
+  std::function<Status(const std::string& tool, const std::string& payload)> check_known = {};
 };
 
 struct ToolChoice {

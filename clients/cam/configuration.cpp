@@ -3,9 +3,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "server/base/units.h"
+#include "server/robot/offset_wrist.h"
 #include "server/robot/wrist.h"
 
 namespace trammel::cam {
@@ -14,8 +18,10 @@ namespace {
 
 constexpr double kNoBranch = 1e9;
 constexpr int kBranches = 8;
-constexpr double kOpen = 0.01;       // rad: a wrist that is open more decides joints 4 and 6
-constexpr double kStretched = 1e-9;  // rad: a wrist that is open less is stretched
+constexpr double kOpen = 0.01;        // rad: a wrist that is open more decides joints 4 and 6
+constexpr double kStretched = 1e-9;   // rad: a wrist that is open less is stretched
+constexpr double kSameJoints = 1e-6;  // rad
+constexpr double kAsNear = 1e-2;      // of the way: how a controller weighs its joints is not known to more
 // rad, beyond a quarter turn: another branch has another joint 4 by half a turn, so a joint that is off by less is of
 // the branch that was meant. Controllers do not ask for more.
 constexpr double kNextQuarter = kPi / 4;
@@ -34,6 +40,14 @@ std::string contradiction(const Configuration& said, const JointVector& q) {
   if (joints.empty()) return "";
   return fmt::format("its configuration contradicts itself: branch {} has {}; the branch is followed", *said.conf,
                      fmt::join(joints, ", "));
+}
+
+/// Where the wrist is stretched joint 4 may be anywhere: it stays.
+JointVector with_joint_4_held(const Chain& arm, const JointVector& q, const JointVector& before) {
+  const auto wrist = wrist_opening(arm, q, kStretched);
+  if (!wrist) return q;
+  const JointVector held = turned_idly(arm, q, *wrist, before(3));
+  return arm.joint_outside_limits(held) ? q : held;
 }
 
 /// The chain without joints in front.
@@ -100,6 +114,7 @@ ArmOfProgram::ArmOfProgram(const Chain& robot) : robot_(robot) {
   const bool rail_first = rails_.size() == 1 && rails_[0] == 0;
   Result<Chain> arm = rails_.empty() ? Result<Chain>(robot_) : arm_of(robot_, 1);
   wrist_ = (rails_.empty() || rail_first) && arm && has_spherical_wrist(*arm);
+  offset_wrist_ = (rails_.empty() || rail_first) && arm && has_offset_wrist(*arm);
   if (wrist_) bends_down_ = positive_5_bends_down(*arm);
 }
 
@@ -159,12 +174,7 @@ std::optional<JointVector> ArmOfProgram::by_branches(const Chain& arm, const Pos
   }
   if (best == nullptr) return std::nullopt;
   chosen = best->conf;
-  if (!previous) return best->q;
-  // Where the wrist is stretched joint 4 may be anywhere: it stays.
-  const auto wrist = wrist_opening(arm, best->q, kStretched);
-  if (!wrist) return best->q;
-  const JointVector held = turned_idly(arm, best->q, *wrist, (*previous)(3));
-  return arm.joint_outside_limits(held) ? best->q : held;
+  return previous ? with_joint_4_held(arm, best->q, *previous) : best->q;
 }
 
 NominalJoints ArmOfProgram::by_descent(const Pose& X_BF, const std::map<int, double>& external,
@@ -185,31 +195,94 @@ NominalJoints ArmOfProgram::by_descent(const Pose& X_BF, const std::map<int, dou
   return {found.q, std::nullopt, ""};
 }
 
-NominalJoints ArmOfProgram::joints(const Pose& X_BF, const Configuration& said, const std::map<int, double>& external,
-                                   const std::optional<JointVector>& previous) const {
-  if (!wrist_) return by_descent(X_BF, external, previous);
-  NominalJoints made;
-  if (rails_.empty()) {
-    made.q = by_branches(robot_, X_BF, said, previous, made.conf);
-  } else {
-    const auto value = external.find(0);
-    if (value == external.end()) return {std::nullopt, std::nullopt, "the program does not say where the rail is"};
-    const auto on = arm_on(from_mm(value->second));
-    if (!on) return {std::nullopt, std::nullopt, "the arm on its rail is not understood"};
-    const std::optional<JointVector> before =
-        previous ? std::optional<JointVector>(previous->tail(robot_.size() - 1)) : std::nullopt;
-    if (const auto arm = by_branches(on->arm, on->X_BR.inverse() * X_BF, said, before, made.conf)) {
-      made.q = JointVector(robot_.size());
-      *made.q << from_mm(value->second), *arm;
-    }
-  }
-  if (made.q) made.doubt = contradiction(said, made.q->tail(6));
-  if (!made.q) {
-    made.conf = said.conf;
-    made.why_not = said.conf ? fmt::format("no joints of conf {} bring the tool there", *said.conf)
-                             : "no joints bring the tool there";
+template <typename Solve>
+NominalJoints ArmOfProgram::on_rail(const Pose& X_BF, const std::map<int, double>& external,
+                                    const std::optional<JointVector>& previous, const Solve& solve) const {
+  if (rails_.empty()) return solve(robot_, X_BF, previous);
+  const auto value = external.find(0);
+  if (value == external.end()) return {std::nullopt, std::nullopt, "the program does not say where the rail is"};
+  const auto on = arm_on(from_mm(value->second));
+  if (!on) return {std::nullopt, std::nullopt, "the arm on its rail is not understood"};
+  const std::optional<JointVector> before =
+      previous ? std::optional<JointVector>(previous->tail(robot_.size() - 1)) : std::nullopt;
+  NominalJoints made = solve(on->arm, on->X_BR.inverse() * X_BF, before);
+  if (made.q) {
+    JointVector q(robot_.size());
+    q << from_mm(value->second), *made.q;
+    made.q = q;
   }
   return made;
+}
+
+NominalJoints ArmOfProgram::joints(const Pose& X_BF, const Configuration& said, const std::map<int, double>& external,
+                                   const std::optional<JointVector>& previous) const {
+  if (offset_wrist_ && previous) return nearest(X_BF, external, *previous, false);
+  if (!wrist_) return by_descent(X_BF, external, previous);
+  return on_rail(X_BF, external, previous,
+                 [&](const Chain& arm, const Pose& X_RF, const std::optional<JointVector>& before) {
+                   NominalJoints made;
+                   made.q = by_branches(arm, X_RF, said, before, made.conf);
+                   if (made.q) {
+                     made.doubt = contradiction(said, *made.q);
+                   } else {
+                     made.conf = said.conf;
+                     made.why_not = said.conf ? fmt::format("no joints of conf {} bring the tool there", *said.conf)
+                                              : "no joints bring the tool there";
+                   }
+                   return made;
+                 });
+}
+
+std::optional<JointVector> ArmOfProgram::branch(const Chain& arm, const Pose& X_BF, int number,
+                                                const JointVector& near) const {
+  if (!wrist_) return joints_of_offset_wrist(arm, X_BF, number, near);
+  const auto q = joints_of_branch(arm, X_BF, number, near);
+  return q ? std::optional<JointVector>(with_joint_4_held(arm, *q, near)) : std::nullopt;
+}
+
+std::vector<int> ArmOfProgram::branches_of(const Chain& arm, const JointVector& q) const {
+  const Pose X_BF = arm.flange_pose(q);
+  std::vector<int> found;
+  for (int number = 0; number < kBranches; ++number) {
+    const auto same = branch(arm, X_BF, number, q);
+    if (same && (*same - q).norm() < kSameJoints) found.push_back(number);
+  }
+  return found;
+}
+
+NominalJoints ArmOfProgram::nearest_branch(const Chain& arm, const Pose& X_BF, const JointVector& from,
+                                           bool on_a_line) const {
+  const std::vector<int> own = on_a_line ? branches_of(arm, from) : std::vector<int>();
+  std::optional<JointVector> best, second;
+  double least = std::numeric_limits<double>::infinity(), next = least;
+  for (int number = 0; number < kBranches; ++number) {
+    if (!own.empty() && std::find(own.begin(), own.end(), number) == own.end()) continue;
+    const auto q = branch(arm, X_BF, number, from);
+    if (!q || arm.joint_outside_limits(*q)) continue;
+    const double way = (*q - from).norm();
+    if (best && (*q - *best).norm() < kSameJoints) continue;
+    if (way < least) {
+      second = std::exchange(best, q);
+      next = std::exchange(least, way);
+    } else if (way < next) {
+      second = q;
+      next = way;
+    }
+  }
+  if (!best) return {std::nullopt, std::nullopt, "no joints within the limits bring the tool there"};
+  if (second && next - least <= kSameJoints + kAsNear * least)
+    return {std::nullopt, std::nullopt,
+            "two postures are equally near to the joints before, and the program does not say which"};
+  return {best, std::nullopt, ""};
+}
+
+NominalJoints ArmOfProgram::nearest(const Pose& X_BF, const std::map<int, double>& external, const JointVector& from,
+                                    bool on_a_line) const {
+  if (!wrist_ && !offset_wrist_) return by_descent(X_BF, external, from);
+  return on_rail(X_BF, external, from,
+                 [&](const Chain& arm, const Pose& X_RF, const std::optional<JointVector>& before) {
+                   return nearest_branch(arm, X_RF, *before, on_a_line);
+                 });
 }
 
 std::optional<JointVector> ArmOfProgram::from_axes(const std::vector<double>& axes,

@@ -26,6 +26,10 @@ class ArmOfProgram {
   /// joints nearest to zero.
   [[nodiscard]] NominalJoints joints(const Pose& X_BF, const Configuration& said, const std::map<int, double>& external,
                                      const std::optional<JointVector>& previous) const;
+  /// Of all joints for X_BF those nearest to `from`. `on_a_line`: only of the posture of `from`, which a line does not
+  /// leave. Two postures that are equally near are not decided.
+  [[nodiscard]] NominalJoints nearest(const Pose& X_BF, const std::map<int, double>& external, const JointVector& from,
+                                      bool on_a_line) const;
   /// The chain's joints from a dialect's axes (deg) and external axes (mm); empty where the rail's value is missing.
   [[nodiscard]] std::optional<JointVector> from_axes(const std::vector<double>& axes,
                                                      const std::map<int, double>& external) const;
@@ -42,6 +46,16 @@ class ArmOfProgram {
   };
   /// The arm on its rail, where the rail comes first.
   [[nodiscard]] std::optional<Rail> arm_on(double rail) const;
+  /// What `solve(arm, X_RF, previous)` finds for the turning axes, with the rail's value in front.
+  template <typename Solve>
+  [[nodiscard]] NominalJoints on_rail(const Pose& X_BF, const std::map<int, double>& external,
+                                      const std::optional<JointVector>& previous, const Solve& solve) const;
+  [[nodiscard]] std::optional<JointVector> branch(const Chain& arm, const Pose& X_BF, int number,
+                                                  const JointVector& near) const;
+  /// The branches that `q` is in: several where they meet.
+  [[nodiscard]] std::vector<int> branches_of(const Chain& arm, const JointVector& q) const;
+  [[nodiscard]] NominalJoints nearest_branch(const Chain& arm, const Pose& X_BF, const JointVector& from,
+                                             bool on_a_line) const;
   [[nodiscard]] std::optional<JointVector> by_branches(const Chain& arm, const Pose& X_BF, const Configuration& said,
                                                        const std::optional<JointVector>& previous,
                                                        std::optional<int>& conf) const;
@@ -51,6 +65,7 @@ class ArmOfProgram {
   Chain robot_;
   std::vector<int> turning_, rails_;
   bool wrist_;              ///< the turning axes are an elbow arm with a spherical wrist
+  bool offset_wrist_;       ///< or one as offset_wrist.h describes it
   bool bends_down_ = true;  ///< positive joint 5 bends the tool downward
 };
 

@@ -223,6 +223,7 @@ class Correcting {
     check_path(program_, arm_.robot(), nominal_, rows_, result_);
     result_.rows = std::move(rows_);
     for (const LeftAlone& left : program_.left) {
+      if (left.motion.empty()) continue;  // no motion goes to it: nominal_targets() has a note of it
       ReceiptRow& row = result_.rows.emplace_back();
       row.name = left.name;
       row.file = program_.files[left.file].name;

@@ -118,6 +118,7 @@ Program read_program(Dialect dialect, std::vector<SourceFile> files, const ReadO
   for (const Entry& entry : entries()) {
     if (entry.dialect != dialect) continue;
     Program program = entry.read(std::move(files), options);
+    take_stated(options.stated, program);
     stand_in_world(program, options);
     leave_targets_in(program, options.spared);
     leave_halves_of_arcs(program);

@@ -249,4 +249,15 @@ class Order {
 
 Flow flow_of(const std::vector<Step>& steps, bool in_any_order) { return Order(steps, in_any_order).flow(); }
 
+std::vector<std::set<std::size_t>> motions_before(
+    const Flow& flow, const std::function<std::optional<std::size_t>(std::size_t step)>& moves) {
+  using Last = std::set<std::size_t>;
+  return states_before(
+      flow, Last{kNoMotion},
+      [&](std::size_t step, Last& last) {
+        if (const auto motion = moves(step)) last = {*motion};
+      },
+      [](Last& last, const Last& other, const std::string&) { last.insert(other.begin(), other.end()); });
+}
+
 }  // namespace trammel::cam

@@ -193,4 +193,10 @@ template <typename State, typename Apply, typename Join>
   return StatesBefore<State, Apply, Join>(flow, apply, join, also).find(entry);
 }
 
+/// Of each statement, the motions that may be the last before it, as `moves(step)` numbers them; kNoMotion where none
+/// comes before, or what moved the arm is no motion. `moves` is empty for a statement that does not move the arm.
+constexpr std::size_t kNoMotion = static_cast<std::size_t>(-1);
+[[nodiscard]] std::vector<std::set<std::size_t>> motions_before(
+    const Flow& flow, const std::function<std::optional<std::size_t>(std::size_t step)>& moves);
+
 }  // namespace trammel::cam

@@ -1,13 +1,16 @@
 #include "clients/cam/nominal_targets.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <set>
 
+#include "clients/cam/flow.h"
 #include "clients/cam/stated_robot.h"
 #include "clients/cam/taught.h"
+#include "server/base/plain_text.h"
 #include "server/base/units.h"
 
 namespace trammel::cam {
@@ -20,7 +23,10 @@ client::PoseMm to_wire(const Pose& X_BT) {
   return {p.x(), p.y(), p.z(), R.w(), R.x(), R.y(), R.z()};
 }
 
-constexpr double kLargest = 1e7;  // of a target's numbers, mm or deg
+constexpr double kLargest = 1e7;      // of a target's numbers, mm or deg
+constexpr double kSameJoints = 1e-6;  // rad
+constexpr const char* kNotSaid =
+    "the controller takes the joints nearest to those before, and the program does not say these";
 
 class Finding {
  public:
@@ -31,12 +37,14 @@ class Finding {
 
   NominalTargets find() {
     note_tools();
+    note_unused();
     find_moving_axes();
     find_joints();
-    if (doubts_ > 0)
+    const auto doubts = std::count_if(found_.targets.begin(), found_.targets.end(),
+                                      [](const NominalTarget& target) { return !target.doubt.empty(); });
+    if (doubts > 0)
       found_.notes.push_back(fmt::format(
-          "{} targets: what the program says of the configuration contradicts itself; the branch is followed",
-          doubts_));
+          "{} targets: what the program says of the configuration contradicts itself; the branch is followed", doubts));
     return std::move(found_);
   }
 
@@ -55,6 +63,21 @@ class Finding {
     }
   }
 
+  /// Points that no motion goes to are nothing that is left uncorrected.
+  void note_unused() {
+    constexpr std::size_t kMost = 5;
+    std::vector<std::string> points;
+    for (const LeftAlone& left : program_.left) {
+      if (left.motion.empty())
+        points.push_back(fmt::format("{} ({} line {})", shown(left.name), program_.files[left.file].name, left.line));
+    }
+    if (points.empty()) return;
+    const std::size_t more = points.size() - std::min(points.size(), kMost);
+    points.resize(points.size() - more);
+    found_.notes.push_back(fmt::format("no motion in these files goes to {}{}: what is not used stays as it is",
+                                       fmt::join(points, ", "), more > 0 ? fmt::format(" and {} more", more) : ""));
+  }
+
   /// External axes that the cell has no rail for: the robot stands still only where they do.
   void find_moving_axes() {
     std::map<int, std::set<double>> values;
@@ -62,78 +85,180 @@ class Finding {
       for (const auto& [axis, value] : target.external) values[axis].insert(value);
     }
     const int rails = arm_.has_rail() ? 1 : 0;
-    for (const auto& [axis, seen] : values) {
+    for (auto& [axis, seen] : values) {
+      if (carries_robot(program_, axis)) seen.insert(0);
       if (axis >= rails && seen.size() > 1) moving_axes_.insert(axis);
     }
   }
 
+  /// Where a motion leaves the arm.
+  struct Stand {
+    std::optional<JointVector> q;  ///< empty: not known
+    bool posture_only = false;     ///< somewhere on a line from there
+    bool operator==(const Stand& other) const {
+      if (posture_only != other.posture_only || q.has_value() != other.q.has_value()) return false;
+      return !q || (*q - *other.q).norm() < kSameJoints;
+    }
+  };
+
   void find_joints() {
-    // In the order of the motions, since one motion may leave its configuration to the one before.
-    std::map<std::size_t, std::optional<JointVector>> last;
-    std::vector<bool> done(program_.targets.size(), false);
-    const auto one = [&](std::size_t t) {
-      std::optional<JointVector>& previous = last[program_.targets[t].file];
-      if (!done[t]) find_joints(t, previous);
-      done[t] = true;
-      if (found_.targets[t].q) previous = found_.targets[t].q;
-    };
+    done_.assign(program_.targets.size(), false);
+    stands_.assign(program_.moves.size(), std::nullopt);
+    // A loop leads back to motions that stand above.
+    do {
+      changed_ = false;
+      for (std::size_t m = 0; m < program_.moves.size(); ++m) follow(m);
+    } while (changed_);
     for (const ProgramMove& move : program_.moves) {
-      for (const std::size_t t : move.targets) one(t);
+      for (const std::size_t t : move.targets) {
+        if (!done_[t]) leave_open(t, kNotSaid);
+      }
     }
     for (std::size_t t = 0; t < program_.targets.size(); ++t) {
-      if (!done[t]) one(t);
+      if (!done_[t]) by_configuration(t);
     }
   }
 
-  void find_joints(std::size_t t, const std::optional<JointVector>& previous) {
+  void follow(std::size_t m) {
+    const ProgramMove& move = program_.moves[m];
+    std::vector<Stand> from = stands_before(move);
+    if (from.empty() && move.choice != JointChoice::kByConfiguration && move.near.empty()) return;
+    const Stand line{from.size() == 1 ? from[0].q : std::nullopt, true};
+    for (const std::size_t t : move.targets) {
+      const bool is_open = move.choice != JointChoice::kByConfiguration && !is_joints(program_.targets[t].coordinates);
+      if (is_open)
+        find_open(t, move, from);
+      else
+        by_configuration(t);
+      from = {{found_.targets[t].q}};
+    }
+    const bool known = !move.targets.empty() && !move.left_some && from[0].q;
+    const Stand now = known ? from[0] : move.choice == JointChoice::kOnALine ? line : Stand{};
+    if (stands_[m] == now) return;
+    stands_[m] = now;
+    changed_ = true;
+  }
+
+  /// Where it may begin, as far as that is found already.
+  [[nodiscard]] std::vector<Stand> stands_before(const ProgramMove& move) const {
+    std::vector<Stand> from;
+    for (const std::size_t m : move.before) {
+      const std::optional<Stand> stand = m == kNoMotion ? Stand{} : stands_[m];
+      if (stand && std::find(from.begin(), from.end(), *stand) == from.end()) from.push_back(*stand);
+    }
+    return from;
+  }
+
+  void by_configuration(std::size_t t) {
+    std::optional<JointVector>& previous = last_[program_.targets[t].file];
+    if (!done_[t] && prepare(t)) take(t, as_said(t, previous));
+    done_[t] = true;
+    if (found_.targets[t].q) previous = found_.targets[t].q;
+  }
+
+  /// A target whose joints the controller chooses by those before it. All ways to it must lead to the same.
+  void find_open(std::size_t t, const ProgramMove& move, std::vector<Stand> from) {
+    if (!move.near.empty()) from = {{arm_.from_axes(in_degrees(Coordinates::kJointRadians, move.near), {})}};
+    for (const Stand& stand : from) {
+      NominalTarget& target = found_.targets[t];
+      const NominalTarget was = target;
+      if (!was.why_not.empty()) return;
+      const bool on_a_line = move.choice == JointChoice::kOnALine;
+      done_[t] = true;
+      if (!prepare(t)) return;
+      const bool enough = stand.q && (!stand.posture_only || on_a_line);
+      if (!enough && !program_.targets[t].configuration.said()) return leave_open(t, kNotSaid);
+      if (!enough) note_as_said(t);
+      take(t, enough ? arm_.nearest(flange_of(t), program_.targets[t].external, *stand.q, on_a_line) : as_said(t, {}));
+      if (!was.q || !target.q) continue;
+      if (!same_posture(*was.q, *target.q)) return leave_open(t, "motions come to it in different postures");
+      target = was;
+    }
+  }
+
+  void note_as_said(std::size_t t) {
+    if (noted_as_said_) return;
+    noted_as_said_ = true;
+    const ProgramTarget& target = program_.targets[t];
+    found_.notes.push_back(fmt::format(
+        "{} ({} line {}): the controller takes the joints nearest to those before, which the program does not say; the "
+        "configuration of the target is taken",
+        shown(target.name), program_.files[target.file].name, target.line));
+  }
+
+  void leave_open(std::size_t t, const char* why) {
+    found_.targets[t] = {};
+    found_.targets[t].why_not = why;
+    done_[t] = true;
+  }
+
+  /// Whole turns aside.
+  static bool same_posture(const JointVector& a, const JointVector& b) {
+    return (a - b).unaryExpr([](double d) { return std::remainder(d, 2 * kPi); }).norm() < kSameJoints;
+  }
+
+  /// Whether there is a pose whose joints are to be found; joints are taken as they stand.
+  bool prepare(std::size_t t) {
     const ProgramTarget& target = program_.targets[t];
     const ToolChoice& choice = found_.tools[target.tool];
-    if (!choice.why_not.empty()) {
-      found_.targets[t].why_not = choice.why_not;
-      return;
-    }
+    found_.targets[t] = {};
+    NominalTarget& found = found_.targets[t];
+    found.why_not = choice.why_not;
+    if (!found.why_not.empty()) return false;
     for (const auto& [axis, value] : target.external) {
       if (!moving_axes_.contains(axis)) continue;
-      found_.targets[t].why_not =
-          fmt::format("external axis {} moves, and the cell has none", static_cast<char>('a' + axis));
-      return;
+      found.why_not = fmt::format(
+          "{0} {1}, and the cell has none; --idle-axis '{0}' says that it carries neither robot nor part",
+          axis_called(program_, axis), carries_robot(program_, axis) ? "is not at zero throughout" : "moves");
+      return false;
     }
     const auto beyond = [](double number) { return !(std::abs(number) < kLargest); };
     if (std::any_of(target.numbers.begin(), target.numbers.end(), beyond)) {
-      found_.targets[t].why_not = "a number that no robot reaches";
-      return;
+      found.why_not = "a number that no robot reaches";
+      return false;
     }
-    client::TargetMm& asked = found_.targets[t].asked;
-    if (is_joints(target.coordinates)) {
-      const auto q = arm_.from_axes(in_degrees(target.coordinates, target.numbers), target.external);
-      if (!q) {
-        found_.targets[t].why_not = "the program does not say where the rail is";
-        return;
-      }
-      asked.joint_target = true;
-      asked.seed_rad = joints_on_wire(*q, arm_.robot());
-      found_.targets[t].q = *q;
-      return;
+    if (!is_joints(target.coordinates)) return true;
+    const auto q = arm_.from_axes(in_degrees(target.coordinates, target.numbers), target.external);
+    if (!q) {
+      found.why_not = "the program does not say where the rail is";
+      return false;
     }
+    found.asked.joint_target = true;
+    found.asked.seed_rad = joints_on_wire(*q, arm_.robot());
+    found.q = *q;
+    return false;
+  }
+
+  /// Of a pose that is prepared.
+  [[nodiscard]] Pose flange_of(std::size_t t) const {
+    const ProgramTarget& target = program_.targets[t];
     const Pose X_BT = program_.frames[target.frame].X_BO * pose_of(target.coordinates, target.numbers);
-    asked.pose = to_wire(X_BT);
-    const NominalJoints found =
-        arm_.joints(X_BT * cell_.tools.at(choice.tool).inverse(), target.configuration, target.external, previous);
-    found_.targets[t].doubt = found.doubt;
-    if (!found.doubt.empty()) ++doubts_;
-    if (found.q) {
-      asked.seed_rad = joints_on_wire(*found.q, arm_.robot());
-      found_.targets[t].q = *found.q;
-      if (outside(*found.q) && found.conf && !arm_.has_rail()) {
+    return X_BT * cell_.tools.at(found_.tools[target.tool].tool).inverse();
+  }
+
+  void take(std::size_t t, const NominalJoints& joints) {
+    const ProgramTarget& target = program_.targets[t];
+    NominalTarget& found = found_.targets[t];
+    found.asked.pose = to_wire(program_.frames[target.frame].X_BO * pose_of(target.coordinates, target.numbers));
+    found.doubt = joints.doubt;
+    if (joints.q) {
+      found.asked.seed_rad = joints_on_wire(*joints.q, arm_.robot());
+      found.q = *joints.q;
+      if (outside(*joints.q) && joints.conf && !arm_.has_rail()) {
         // So that the answer names the branches that would reach it.
-        asked.seed_rad.clear();
-        asked.conf = found.conf;
+        found.asked.seed_rad.clear();
+        found.asked.conf = joints.conf;
       }
-    } else if (found.conf && !arm_.has_rail()) {
-      asked.conf = found.conf;
+    } else if (joints.conf && !arm_.has_rail()) {
+      found.asked.conf = joints.conf;
     } else {
-      found_.targets[t].why_not = found.why_not;
+      found.why_not = joints.why_not;
     }
+  }
+
+  [[nodiscard]] NominalJoints as_said(std::size_t t, const std::optional<JointVector>& previous) const {
+    const ProgramTarget& target = program_.targets[t];
+    return arm_.joints(flange_of(t), target.configuration, target.external, previous);
   }
 
   [[nodiscard]] bool outside(const JointVector& q) const { return arm_.robot().joint_outside_limits(q).has_value(); }
@@ -143,7 +268,10 @@ class Finding {
   const CellTools& cell_;
   NominalTargets found_;
   std::set<int> moving_axes_;
-  std::size_t doubts_ = 0;
+  std::map<std::size_t, std::optional<JointVector>> last_;  ///< by file
+  std::vector<bool> done_;
+  std::vector<std::optional<Stand>> stands_;  ///< behind each motion; empty: not followed yet
+  bool changed_ = false, noted_as_said_ = false;
 };
 
 }  // namespace

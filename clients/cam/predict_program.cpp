@@ -87,7 +87,9 @@ Result<PredictedProgram> predict_program(const Program& program, const Chain& ro
     for (std::size_t k = 0; k < found.size(); ++k)
       take(answer->items[k], robot, *nominal->targets[found[k]].q, result.targets[found[k]]);
   }
-  for (const LeftAlone& one : program.left) result.targets.push_back(left(program, one));
+  for (const LeftAlone& one : program.left) {
+    if (!one.motion.empty()) result.targets.push_back(left(program, one));
+  }
   std::stable_sort(result.targets.begin(), result.targets.end(),
                    [](const PredictedTarget& a, const PredictedTarget& b) {
                      return std::tie(a.file, a.line) < std::tie(b.file, b.line);

@@ -1,6 +1,7 @@
 #include "clients/cam/program.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -203,6 +204,39 @@ void leave_halves_of_arcs(Program& program) {
     }
   }
   if (any) remove_targets(program, leave);
+}
+
+bool carries_robot(const Program& program, int axis) {
+  return program.dialect == "inform" && axis >= kFirstBaseAxis && axis < kFirstStationAxis;
+}
+
+std::string axis_called(const Program& program, int axis) {
+  const int of_six = axis % 6 + 1;
+  if (program.dialect == "fanuc")
+    return axis < 6 ? fmt::format("axis E{}", of_six) : fmt::format("group {}, axis {}", axis / 6 + 1, of_six);
+  if (program.dialect == "inform")
+    return fmt::format("{} axis {}", axis < kFirstStationAxis ? "base" : "station", of_six);
+  return fmt::format("external axis {}", static_cast<char>('a' + axis));
+}
+
+Status take_idle_axes(Program& program, const std::vector<std::string>& names) {
+  std::map<std::string, int> known;
+  for (const ProgramTarget& target : program.targets) {
+    for (const auto& [axis, value] : target.external) known.emplace(axis_called(program, axis), axis);
+  }
+  for (const std::string& name : names) {
+    const auto axis = known.find(name);
+    if (axis == known.end()) {
+      std::vector<std::string> all;
+      for (const auto& [called, number] : known) all.push_back("'" + called + "'");
+      return failure(ErrorCode::kUsage, "the program has no axis '{}'", shown(name))
+          .of("--idle-axis")
+          .with_text(name)
+          .next(all.empty() ? "its targets have no external axes" : fmt::format("it has {}", fmt::join(all, ", ")));
+    }
+    for (ProgramTarget& target : program.targets) target.external.erase(axis->second);
+  }
+  return {};
 }
 
 int line_of(const std::string& text, std::size_t at) {

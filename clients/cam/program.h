@@ -151,6 +151,13 @@ struct LeftAlone {
   std::string why;
 };
 
+/// By what a controller chooses among the joints that bring the tool to a pose.
+enum class JointChoice {
+  kByConfiguration,  ///< as the target says it
+  kNearest,          ///< to joints that the motion names, or to those before it
+  kOnALine           ///< the posture before stays
+};
+
 /// A motion, in the order of the text.
 struct ProgramMove {
   std::size_t file = 0;
@@ -160,6 +167,9 @@ struct ProgramMove {
   bool arc_goes_on = false;               ///< it is part of the arc of the motion before
   bool left_some = false;                 ///< a target of it is left
   std::optional<double> speed_mm_s = {};  ///< of the tool, where the motion says it
+  JointChoice choice = JointChoice::kByConfiguration;
+  std::vector<double> near = {};      ///< rad, joints that the motion names; empty: none
+  std::set<std::size_t> before = {};  ///< motions that may be the last before it, as motions_before() has them
 };
 
 /// A statement reads the stored numbers of a target: what it makes of them moves where the target is corrected.
@@ -181,7 +191,14 @@ struct MarkPlace {
   bool a_line_each = false;  ///< for each word of the mark
 };
 
-struct Program {
+/// What the controller's own files say of the robot.
+struct StatedRobot {
+  std::vector<StatedBase> bases;  ///< the first holds
+  std::vector<StatedNumber> numbers;
+  std::vector<StatedType> types;
+};
+
+struct Program : StatedRobot {
   std::string dialect;
   std::vector<SourceFile> files;
   std::vector<MarkPlace> mark_places;  ///< one a file
@@ -191,10 +208,7 @@ struct Program {
   std::vector<LeftAlone> left;
   std::vector<ProgramMove> moves;
   std::vector<Reading> readings;
-  std::vector<StatedBase> bases;      ///< the first holds
-  std::vector<StatedNumber> numbers;  ///< of the robot
-  std::vector<StatedType> types;      ///< of the robot
-  std::vector<std::string> notes;     ///< what could not be compared, a sentence each
+  std::vector<std::string> notes;  ///< what could not be compared, a sentence each
 
   /// Whether any motion or target was seen in any of the files, be it one that is left as it is.
   [[nodiscard]] bool is_understood() const { return !(moves.empty() && targets.empty() && left.empty()); }
@@ -205,6 +219,8 @@ struct ReadOptions {
   bool keep_joints = false;                 ///< joint targets stay as they are
   std::map<std::string, Pose> frames = {};  ///< values of tools and frames that the files leave open, by name
   std::set<std::string> spared = {};        ///< files that are read and not written
+  std::vector<std::string> idle_axes = {};  ///< external axes that carry neither robot nor part, by axis_called()
+  StatedRobot stated = {};                  ///< by files that are no programs
 };
 
 /// The row of --frames that tells where the robot stands in the world that the program's frames are told in.
@@ -233,6 +249,16 @@ struct FramesRows {
 void leave_targets_in(Program& program, const std::set<std::string>& files);
 /// Leaves the other target of each arc that one is left of: half an arc corrected is another arc.
 void leave_halves_of_arcs(Program& program);
+
+/// Of Yaskawa's external axes, in pulses: those that carry the robot, and behind them those that carry the part.
+constexpr int kFirstBaseAxis = 6, kFirstStationAxis = 12;
+/// Whether the robot stands elsewhere as soon as the axis is not at zero.
+[[nodiscard]] bool carries_robot(const Program& program, int axis);
+/// An external axis as a person calls it: `external axis b`, `group 2, axis 1` (FANUC), `base axis 1` (Yaskawa).
+[[nodiscard]] std::string axis_called(const Program& program, int axis);
+/// Takes axes out of the targets that carry neither robot nor part, called as axis_called() does. Refuses a name that
+/// no axis of the program has.
+[[nodiscard]] Status take_idle_axes(Program& program, const std::vector<std::string>& names);
 
 /// The number of the line of a byte, from 1.
 [[nodiscard]] int line_of(const std::string& text, std::size_t at);

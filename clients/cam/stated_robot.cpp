@@ -124,6 +124,12 @@ std::string upper(std::string text) {
   return text;
 }
 
+/// ABB's number of a model: 6640 of `ROB1_6640_2.75_205`.
+std::string abb_model(const std::string& type) {
+  const std::size_t first = type.starts_with("ROB") ? std::min(type.find('_'), type.size() - 1) + 1 : type.size();
+  return type.substr(first, std::min(type.find_first_not_of("0123456789", first), type.size()) - first);
+}
+
 /// KUKA's types say load and reach, KR 210 R2700. Words beside them are spelled in many ways.
 std::optional<Error> contradiction(const StatedType& stated, const Chain& robot) {
   const std::string theirs = upper(stated.type), ours = upper(robot.name());
@@ -131,7 +137,9 @@ std::optional<Error> contradiction(const StatedType& stated, const Chain& robot)
     const std::string a = digits_behind(theirs, letters, fewest), b = digits_behind(ours, letters, fewest);
     return !a.empty() && !b.empty() && a != b;
   };
-  if (!differ("KR", 1) && !differ("R", kFewest)) return std::nullopt;
+  const std::string abb = abb_model(theirs), irb = digits_behind(ours, "IRB", 2);
+  const bool other_abb = !abb.empty() && !irb.empty() && abb != irb;
+  if (!other_abb && !differ("KR", 1) && !differ("R", kFewest)) return std::nullopt;
   return refused("{} says {}, the robot file is of {}", stated.name, shown(stated.type), shown(robot.name()))
       .in(stated.file)
       .at_row(stated.line)
@@ -142,6 +150,12 @@ std::optional<Error> contradiction(const StatedType& stated, const Chain& robot)
 }
 
 }  // namespace
+
+void take_stated(const StatedRobot& stated, StatedRobot& all) {
+  all.bases.insert(all.bases.end(), stated.bases.begin(), stated.bases.end());
+  all.numbers.insert(all.numbers.end(), stated.numbers.begin(), stated.numbers.end());
+  all.types.insert(all.types.end(), stated.types.begin(), stated.types.end());
+}
 
 void stand_in_world(Program& program, const ReadOptions& options) {
   if (const auto row = options.frames.find(kRobotBase); row != options.frames.end())

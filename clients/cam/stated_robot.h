@@ -9,6 +9,9 @@
 /// What the files of a controller say of the robot itself: where it stands, and which one it is.
 namespace trammel::cam {
 
+/// Adds what further files say.
+void take_stated(const StatedRobot& stated, StatedRobot& all);
+
 /// Makes the frames of a program seen from the robot's base: by a row `robot_base` of --frames, else by what the files
 /// say; where nobody says anything the controller's world is the base.
 void stand_in_world(Program& program, const ReadOptions& options);

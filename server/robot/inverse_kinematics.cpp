@@ -5,6 +5,7 @@
 
 #include "server/base/check.h"
 #include "server/base/units.h"
+#include "server/robot/angles.h"
 #include "server/robot/flange_motion.h"
 
 namespace trammel {
@@ -178,17 +179,6 @@ std::optional<std::array<double, 6>> branch(const Chain& chain, const Pose& X_BF
   return theta;
 }
 
-/// `angle` (rad) plus the number of whole turns that brings it nearest to `near` within the joint's limits. If none
-/// lies within the limits, the nearest of all.
-double nearest_turn(const Joint& joint, double angle, double near) {
-  const double nearest = angle + 2 * kPi * std::round((near - angle) / (2 * kPi));
-  for (const double turns : {0.0, 1.0, -1.0, 2.0, -2.0}) {
-    const double candidate = nearest + 2 * kPi * turns;
-    if (candidate >= joint.lower - 1e-9 && candidate <= joint.upper + 1e-9) return candidate;
-  }
-  return nearest;
-}
-
 }  // namespace
 
 Result<InverseResult> inverse_kinematics(const Chain& chain, const Pose& X_BF, int conf,
@@ -209,11 +199,7 @@ std::optional<JointVector> joints_of_branch(const Chain& chain, const Pose& X_BF
                                             const std::optional<JointVector>& near) {
   const auto theta = branch(chain, X_BF, (conf & 4) != 0, (conf & 2) != 0, (conf & 1) != 0);
   if (!theta) return std::nullopt;
-  Vector6 value;
-  for (int i = 0; i < 6; ++i) value(i) = (*theta)[static_cast<std::size_t>(i)] - chain.joint(i).link.theta;
-  JointVector q = Eigen::Matrix<double, 6, 6>(chain.transmission()).partialPivLu().solve(value);
-  for (int i = 0; i < 6; ++i) q(i) = nearest_turn(chain.joint(i), q(i), near ? (*near)(i) : 0.0);
-  return q;
+  return joints_of_angles(chain, *theta, near);
 }
 
 Result<int> branch_of(const Chain& chain, const JointVector& q) {

@@ -135,6 +135,18 @@ TEST_F(ImportBackup, SaysWhoseBackupItIsWhereItIsNotAbbs) {
   }
 }
 
+TEST_F(ImportBackup, RefusesTheBackupOfAnotherRobotThanTheRobotFileIsOf) {
+  ASSERT_EQ(run({"-o", file("cell.yaml"), "--name", "c", "--robot", kRobot}), 0);
+  const std::string good = text(moc);
+  change(moc, " -use_joint_4 \"rob1_5\" -use_joint_5 \"rob1_6\"", "");
+  EXPECT_EQ(run({"-o", file("four.yaml"), "--name", "c", "--robot", kRobot}), 3) << "four axes";
+  EXPECT_EQ(run({"--compare", file("cell.yaml")}), 3);
+  folder_.write(moc, replaced(good, "ROB1_6640_205_275", "ROB1_4400_60_1.96"));
+  EXPECT_EQ(run({"-o", file("type.yaml"), "--name", "c", "--robot", kRobot}), 3) << "another type";
+  EXPECT_EQ(run({"--compare", file("cell.yaml")}), 3);
+  EXPECT_FALSE(std::filesystem::exists(file("type.yaml")));
+}
+
 TEST_F(ImportBackup, AnythingMayStandInTheParameters) {
   const std::string good = text(moc);
   for (std::size_t cut = 0; cut < good.size(); cut += 7)

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include "tests/support/shifting_model.h"
@@ -70,7 +72,8 @@ TEST(Fanuc, WhatIsDecidedAtRunTimeIsLeftWithTheReason) {
   EXPECT_NE(why(made, "P[1]").find("Offset"), std::string::npos);
   EXPECT_NE(why(made, "P[2]").find("Tool_Offset"), std::string::npos);
   EXPECT_NE(why(made, "P[3]").find("set at run time"), std::string::npos);
-  EXPECT_NE(why(made, "P[4]").find("no motion"), std::string::npos);
+  EXPECT_NE(fmt::format("{}", fmt::join(made.program.notes, "\n")).find("no motion in these files goes to P[4]"),
+            std::string::npos);
   EXPECT_NE(why(made, "P[5]").find("sensor"), std::string::npos);
   EXPECT_NE(why(made, "P[9]").find("not in /POS"), std::string::npos);
 }
@@ -223,6 +226,57 @@ TEST(Fanuc, ARegisterThatIsMadeOfACorrectedPositionIsSaidToMoveWithIt) {
       program("   2:  PR[5]=P[1] ;\n   3:L P[1] 100mm/sec FINE ;\n   4:L PR[5] 100mm/sec FINE ;\n", position(1, kXyz)));
   EXPECT_TRUE(row_of(made.program, "P[1]").corrected());
   EXPECT_NE(why(made, "PR[5]").find("it moves with P[1], which is corrected"), std::string::npos) << why(made, "PR[5]");
+}
+
+std::string with_line_track(const std::string& schedule) {
+  std::string text = program("   2:L P[1] 100mm/sec FINE ;\n", position(1, kXyz));
+  return text.replace(text.find("/MN"), 0,
+                      "/APPL\n  LINE_TRACK ;\n    LINE_TRACK_SCHEDULE_NUMBER      : " + schedule + " ;\n");
+}
+
+TEST(Fanuc, WhatIsSeenFromAConveyorIsLeft) {
+  EXPECT_NE(why(ls(with_line_track("1")), "P[1]").find("LINE_TRACK (line 6): it is seen from a conveyor"),
+            std::string::npos)
+      << why(ls(with_line_track("1")), "P[1]");
+  EXPECT_TRUE(row_of(ls(with_line_track("0")).program, "P[1]").corrected());
+}
+
+TEST(Fanuc, WhatASeamTrackerMovesIsLeftUntilItEnds) {
+  const test::Corrected made =
+      ls(program("   2:L P[1] 100mm/sec FINE ;\n   3:Track TAST[1] ;\n"
+                 "   4:L P[2] 100mm/sec FINE ;\n   5:Track End ;\n   6:L P[3] 100mm/sec FINE ;\n",
+                 position(1, kXyz) + position(2, kXyz) + position(3, kXyz)));
+  EXPECT_TRUE(row_of(made.program, "P[1]").corrected());
+  EXPECT_NE(why(made, "P[2]").find("Track TAST (line 8) moves it at run time"), std::string::npos) << why(made, "P[2]");
+  EXPECT_TRUE(row_of(made.program, "P[3]").corrected());
+}
+
+/// A servo gun as group 2, which opens and closes.
+std::string with_gun(const std::string& more = "") {
+  const auto gun = [](const std::string& text, const std::string& opening) {
+    return text.substr(0, text.find("\n};")) + "\n   GP2:\n\tUF : 1, UT : 2,\n\tJ1=    " + opening + "  mm\n};\n";
+  };
+  return program("   2:L P[1] 100mm/sec FINE ;\n   3:L P[2] 100mm/sec FINE ;\n" + more,
+                 gun(position(1, kXyz), "60.000") + gun(position(2, kXyz), "12.000"));
+}
+
+TEST(Fanuc, AnAxisThatMovesIsNamedByGroupAndNumberUnlessItIsSaidToCarryNothing) {
+  EXPECT_NE(why(ls(with_gun()), "P[1]").find("group 2, axis 1 moves, and the cell has none"), std::string::npos)
+      << why(ls(with_gun()), "P[1]");
+  Program program = read_program(Dialect::kFanuc, {{"p1.ls", with_gun()}}, {});
+  const Status unknown = take_idle_axes(program, {"g"});
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().field, "--idle-axis");
+  ASSERT_TRUE(take_idle_axes(program, {"group 2, axis 1"}));
+  for (const ProgramTarget& target : program.targets) EXPECT_TRUE(target.external.empty());
+}
+
+TEST(Fanuc, APointThatNoMotionGoesToIsANoteAndNothingThatIsLeft) {
+  const test::Corrected made = ls(program("   2:L P[1] 100mm/sec FINE ;\n", position(1, kXyz) + position(2, kXyz)));
+  EXPECT_EQ(made.program.left_alone(), 0u);
+  ASSERT_EQ(made.program.notes.size(), 1u);
+  EXPECT_NE(made.program.notes[0].find("no motion in these files goes to P[2] (p1.ls line"), std::string::npos)
+      << made.program.notes[0];
 }
 
 }  // namespace

@@ -100,6 +100,33 @@ TEST(Inform, PointsOfOneArcAreCorrectedTogether) {
   EXPECT_TRUE(row_of(with("P001").program, "C00000").corrected());
 }
 
+test::Corrected jbi_with_axes(const std::string& first, const std::string& second) {
+  return jbi(
+      "/JOB\r\n//NAME DRILL\r\n//POS\r\n///NPOS 2,2,0,0,0,0\r\n///TOOL 1\r\n///POSTYPE BASE"
+      "\r\n///RECTAN\r\n///RCONF 1,0,0,0,0,0,0,0\r\nC00000=1800.000,-250.000,800.000,0.0000,60.0000,0.0000\r\n"
+      "C00001=1800.0,0,900.,0,60,0\r\n///TOOL 0\r\n///POSTYPE PULSE\r\n///PULSE\r\nBC00000=" +
+      first + "\r\nBC00001=" + second +
+      "\r\n//INST\r\n///GROUP1 RB1,BS1\r\nNOP\r\nMOVL C00000 BC00000 V=100.0\r\n"
+      "MOVL C00001 BC00001 V=100.0\r\nEND\r\n");
+}
+
+TEST(Inform, WhereABaseAxisMovesThatTheCellHasNotTargetsAreLeft) {
+  EXPECT_EQ(jbi_with_axes("0", "0").program.left_alone(), 0u) << why(jbi_with_axes("0", "0"), "C00000");
+  for (const auto& [first, second] : {std::pair("0", "250000"), std::pair("250000", "250000")}) {
+    const test::Corrected made = jbi_with_axes(first, second);
+    EXPECT_EQ(made.program.left_alone(), 2u);
+    EXPECT_NE(why(made, "C00000").find("base axis 1 is not at zero throughout, and the cell has none"),
+              std::string::npos)
+        << why(made, "C00000");
+  }
+}
+
+TEST(Inform, AJobOfAnotherRobotIsLeft) {
+  std::string text = job("C00000=1800.000,-250.000,800.000,0.0000,60.0000,0.0000\r\n", "MOVL C00000 V=100.0\r\n");
+  text.replace(text.find("GROUP1 RB1"), 10, "GROUP1 RB2");
+  EXPECT_NE(why(jbi(text), "C00000").find("moves RB2, another robot"), std::string::npos) << why(jbi(text), "C00000");
+}
+
 // Universal Robots
 
 test::Corrected script(const std::string& text) { return corrected_by_shift(Dialect::kUrScript, {{"p.script", text}}); }
@@ -162,13 +189,40 @@ TEST(UrScript, WhatALoopChangesAtItsEndHoldsAtItsHeadToo) {
 TEST(UrScript, AThreadMaySetItsToolAtAnyTime) {
   const auto with = [](const std::string& lines) {
     return script("def drill():\n  thread watch():\n    while (True):\n" + lines + "    end\n  end\n" + kTcp +
-                  "  run watch()\n  movel(p[1.8, -0.25, 0.8, 0, 1.0472, 0], a=1.2, v=0.1)\nend\n");
+                  "  run watch()\n  movej([0, -0.35, 0.35, 0, 0.5, 0])\n"
+                  "  movel(p[1.8, -0.25, 0.8, 0, 1.0472, 0], a=1.2, v=0.1)\nend\n");
   };
   const test::Corrected set = with("      set_tcp(p[0, 0, 0.2, 0, 0, 0])\n");
-  EXPECT_NE(set.program.rows.at(0).message.find("set_tcp: the thread watch may change it"), std::string::npos)
-      << set.program.rows[0].message;
+  EXPECT_NE(set.program.rows.at(1).message.find("set_tcp: the thread watch may change it"), std::string::npos)
+      << set.program.rows[1].message;
   const test::Corrected harmless = with("      sleep(1)\n");
-  EXPECT_TRUE(harmless.program.rows.at(0).corrected()) << harmless.program.rows[0].message;
+  EXPECT_TRUE(harmless.program.rows.at(1).corrected()) << harmless.program.rows[1].message;
+}
+
+TEST(UrScript, InverseAndSumOfConstantPosesAreFoldedToo) {
+  const test::Corrected made = script(
+      "def p():\n" + kTcp +
+      "  plane = p[1, 2, 3, 0, 0, 0.2]\n  movej([0, -0.35, 0.35, 0, 0.5, 0])\n"
+      "  movel(pose_trans(plane, pose_trans(pose_inv(p[1, 2, 3, 0, 0, 0.2]), p[1.8, -0.25, 0.8, 0, 1.0472, 0])))\n"
+      "  movel(pose_add(p[1.8, 0, 0.8, 0, 1.0472, 0], p[0, 0.1, 0, 0, 0, 0]))\nend\n");
+  EXPECT_EQ(made.program.left_alone(), 0u);
+  const auto at = [&](std::size_t row) { return made.program.rows.at(row).before; };
+  EXPECT_NEAR(at(1)[0], 1.8, 1e-12);
+  EXPECT_NEAR(at(1)[1], -0.25, 1e-12);
+  EXPECT_NEAR(at(1)[4], 1.0472, 1e-12);
+  EXPECT_NEAR(at(2)[1], 0.1, 1e-12);
+  EXPECT_NEAR(at(2)[4], 1.0472, 1e-12);
+}
+
+TEST(UrScript, WhatIsSeenFromAConveyorIsLeft) {
+  for (const char* track : {"track_conveyor_linear(p[0.1, 0, 0, 0, 0, 0], 500)", "track_conveyor_circular(c, 500)"}) {
+    const test::Corrected made = script("def p():\n" + kTcp + "  movej([0, -0.35, 0.35, 0, 0.5, 0])\n  " + track +
+                                        "\n  movel(p[1.8, -0.25, 0.8, 0, 1.0472, 0])\n  stop_conveyor_tracking()\n"
+                                        "  movel(p[1.8, -0.2, 0.8, 0, 1.0472, 0])\nend\n");
+    EXPECT_NE(why(made, "p[1.8, -0.25, 0.8, 0, 1.0472, 0]").find("conveyor that moves (line 4)"), std::string::npos)
+        << why(made, "p[1.8, -0.25, 0.8, 0, 1.0472, 0]");
+    EXPECT_TRUE(row_of(made.program, "p[1.8, -0.2, 0.8, 0, 1.0472, 0]").corrected());
+  }
 }
 
 TEST(UrScript, ThePayloadIsComparedWithTheCells) {

@@ -386,8 +386,122 @@ TEST(Rapid, NamesAreSpelledAsTheProgramSpellsThemAndOptionalArgumentsAreFollowed
       rapid(program(target("pUnUsed", "0,125,400") + target("pA", "0,125,400"),
                     "    drill pA\\w:=wPanel;\n  ENDPROC\n  PROC drill(robtarget p\\PERS wobjdata w)\n"
                     "    MoveL p,v100,fine,tSpindle\\WObj?w;\n"));
-  EXPECT_EQ(why(made, "pUnUsed"), "no motion in these files goes to it");
+  EXPECT_EQ(made.program.left_alone(), 0u);
+  ASSERT_EQ(made.program.notes.size(), 1u);
+  EXPECT_NE(made.program.notes[0].find("no motion in these files goes to pUnUsed (m.mod line"), std::string::npos)
+      << made.program.notes[0];
   EXPECT_TRUE(row_of(made.program, "pA").corrected()) << why(made, "pA");
+}
+
+TEST(Rapid, TheToolOfAMotionThatSetsASignalStandsBehindItsZone) {
+  CorrectProgramOptions options;
+  options.tool = "spindle";
+  const test::Corrected made = rapid("MODULE M\n" + kPanel + target("p10", "0,125,400") + target("p20", "0,125,410") +
+                                         "  PROC main()\n    MoveLDO p10,v100,fine,tHand\\WObj:=wPanel,doVacuum,1;\n"
+                                         "    MoveCSync p10,p20,v100,fine,tHand\\WObj:=wPanel,\"proc\";\n"
+                                         "  ENDPROC\nENDMODULE\n",
+                                     {}, options);
+  ASSERT_EQ(made.refusal, "");
+  EXPECT_EQ(made.program.left_alone(), 0u) << why(made, "p10") << why(made, "p20");
+  EXPECT_NE(made.program.notes.at(0).find("tool tHand is not in the files"), std::string::npos)
+      << made.program.notes[0];
+}
+
+TEST(Rapid, WhereExternalAxesAreDisplacedTargetsThatHaveThemAreLeft) {
+  const std::string on_axis = ",[0.707107,0,0.707107,0],[0,0,0,0],[100,9E9,9E9,9E9,9E9,9E9]]";
+  const std::string data = target("p10", "0,125,400") + "  CONST robtarget p20:=[[0,125,410]" + on_axis +
+                           ";\n  CONST robtarget p30:=[[0,125,420]" + on_axis + ";\n";
+  for (const char* displace : {"EOffsSet eOffs", "EOffsOn\\ExeP:=p10,p20"}) {
+    const test::Corrected made = rapid(
+        program(data, move_l("p30") + "    " + displace + ";\n" + move_l("p10") + move_l("p20") + "    EOffsOff;\n"));
+    EXPECT_TRUE(row_of(made.program, "p10").corrected()) << why(made, "p10");
+    EXPECT_NE(why(made, "p20").find("displaces its external axes (m.mod line"), std::string::npos) << why(made, "p20");
+    EXPECT_TRUE(row_of(made.program, "p30").corrected()) << why(made, "p30");
+  }
+}
+
+/// deg, of the target of that name.
+std::vector<double> joints_of(const test::Corrected& made, const std::string& name) {
+  return row_of(made.program, name).joints;
+}
+
+TEST(Rapid, WithConfLOffALineStaysInThePostureOfTheJointsBeforeIt) {
+  // Both bring the tool to where p10 is; its configuration is a placeholder.
+  const std::string data = "  CONST jointtarget jFlip:=[[4,-10,20,178,-60,-176],[9E9,9E9,9E9,9E9,9E9,9E9]];\n" +
+                           target("p10", "0,125,400") + target("p20", "0,125,410");
+  const auto with = [&](const std::string& confs) {
+    return rapid(program(data, confs + "    MoveAbsJ jFlip,v500,fine,tSpindle;\n" + move_l("p10") + move_l("p20")));
+  };
+  const test::Corrected on = with("");
+  const test::Corrected off = with("    ConfJ\\Off;\n    ConfL\\Off;\n");
+  ASSERT_EQ(off.program.left_alone(), 0u) << why(off, "p10");
+  EXPECT_GT(joints_of(on, "p10").at(4), 0);
+  EXPECT_LT(joints_of(off, "p10").at(4), 0);
+  EXPECT_LT(joints_of(off, "p20").at(4), 0);
+  EXPECT_TRUE(off.program.notes.empty());
+}
+
+TEST(Rapid, WithConfLOffAndNoJointsBeforeANoteSaysThatTheConfigurationIsTaken) {
+  const test::Corrected made =
+      rapid(program(target("p10", "0,125,400"), "    ConfL\\Off;\n" + move_l("p10") + "    ConfL\\On;\n"));
+  EXPECT_TRUE(row_of(made.program, "p10").corrected());
+  ASSERT_EQ(made.program.notes.size(), 1u);
+  EXPECT_NE(made.program.notes[0].find("p10 (m.mod line"), std::string::npos) << made.program.notes[0];
+}
+
+TEST(Rapid, MotionsOfAToolThatTheModelHasNotLearnedWithAreLeft) {
+  const std::string other = "  PERS tooldata tGripper:=[TRUE,[[0,0,350],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];\n";
+  cam::CellTools cell = test::spindle_only();
+  cell.tools["gripper"] = make_pose(Matrix3::Identity(), {0, 0, .35});
+  cell.check_known = [](const std::string& tool, const std::string&) -> Status {
+    if (tool == "gripper") return refused("not trained with gripper");
+    return {};
+  };
+  const std::string text = program(other + target("p10", "0,125,400") + target("p20", "0,125,410"),
+                                   move_l("p10") + "    MoveL p20,v100,fine,tGripper\\WObj:=wPanel;\n");
+  const test::Corrected made = corrected_by_shift(Dialect::kRapid, {{"m.mod", text}}, {}, {}, cell);
+  EXPECT_TRUE(row_of(made.program, "p10").corrected()) << made.refusal << why(made, "p10");
+  EXPECT_NE(why(made, "p20").find("not trained with gripper"), std::string::npos) << why(made, "p20");
+}
+
+/// A program as planning software posts it: what a tool and a work object are is assigned before the motions.
+std::string posted(const std::string& motions) {
+  return "MODULE M\n  LOCAL PERS tooldata tOlp:=[TRUE,[[0,0,0],[1,0,0,0]],[100,[0,0,100],[1,0,0,0],0,0,0]];\n"
+         "  LOCAL PERS wobjdata wOlp:=[FALSE,TRUE,\"\",[[0,0,0],[1,0,0,0]],[[300,-250,300],[1,0,0,0]]];\n" +
+         target("p10", "0,125,400") + target("p20", "0,125,410") + "  PROC main()\n" + motions +
+         "  ENDPROC\nENDMODULE\n";
+}
+const std::string kSetTool = "    tOlp.tframe:=[[100,0,150],[0.923879533,0,-0.382683432,0]];\n";
+std::string to(const std::string& point) { return "    MoveL " + point + ",v100,fine,tOlp\\WObj:=wOlp;\n"; }
+
+TEST(Rapid, ConstantsThatAreAssignedToToolsAndWorkObjectsHoldUntilTheNext) {
+  const test::Corrected made =
+      rapid(posted(kSetTool + "    wOlp.uframe:=[[1400,0,500],[1,0,0,0]];\n    wOlp.uframe.trans:=[1500,0,500];\n" +
+                   to("p10") + "    wOlp.uframe:=[[1490,0,500],[1,0,0,0]];\n" + to("p20")));
+  ASSERT_EQ(made.refusal, "");
+  EXPECT_EQ(made.program.left_alone(), 0u) << why(made, "p10");
+  EXPECT_LT((row_of(made.program, "p10").p_B - Vector3(1.8, -.125, 1.2)).norm(), 1e-12);
+  EXPECT_LT((row_of(made.program, "p20").p_B - Vector3(1.79, -.125, 1.21)).norm(), 1e-12);
+}
+
+TEST(Rapid, AnAssignmentThatABranchDecidesOrThatIsNotConstantLeavesItsMotions) {
+  const std::string frame = "    wOlp.uframe:=[[1500,0,500],[1,0,0,0]];\n";
+  const test::Corrected branch = rapid(posted(kSetTool + frame + to("p10") +
+                                              "    IF di1=1 THEN\n      wOlp.uframe:=[[1490,0,"
+                                              "500],[1,0,0,0]];\n    ENDIF\n" +
+                                              to("p20")));
+  EXPECT_TRUE(row_of(branch.program, "p10").corrected()) << branch.refusal << why(branch, "p10");
+  EXPECT_NE(why(branch, "p20").find("wOlp is set at run time"), std::string::npos) << why(branch, "p20");
+  const test::Corrected number = rapid(posted(kSetTool + frame + "    wOlp.uframe.trans.x:=reg1;\n" + to("p10")));
+  EXPECT_FALSE(row_of(number.program, "p10").corrected());
+  const test::Corrected function = rapid(
+      posted(kSetTool + frame + "    ok:=set();\n" + to("p10") +
+             "  ENDPROC\n  FUNC bool set()\n    wOlp.uframe:=[[1490,0,500],[1,0,0,0]];\n    RETURN TRUE;\n  ENDFUNC\n"
+             "  PROC other()\n"));
+  EXPECT_FALSE(row_of(function.program, "p10").corrected()) << "the function comes in before the motion";
+  const test::Corrected before = rapid(posted(kSetTool + to("p10") + frame + to("p20")));
+  EXPECT_FALSE(row_of(before.program, "p10").corrected()) << "the end of main comes before its head, too";
+  EXPECT_TRUE(row_of(before.program, "p20").corrected()) << why(before, "p20");
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "clients/cam/cell_tools.h"
 #include "clients/cam/number_text.h"
 #include "clients/cam/rapid/rapid.h"
+#include "clients/cam/stated_robot.h"
 #include "server/base/name_check.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
@@ -52,21 +53,29 @@ class Backup {
   Backup(const std::string& parameters, std::string where)
       : where_(std::move(where)), instances_(parameter_instances(parameters)) {}
 
-  Result<ControllerCell> read(const std::vector<SourceFile>& modules, const std::string& unit) {
-    const Result<const ParameterInstance*> robot = choose(unit);
+  Result<ControllerRobot> robot(const std::string& unit, const std::string& next) {
+    const Result<const ParameterInstance*> robot = choose(unit, next);
     if (!robot) return tl::make_unexpected(robot.error());
     cell_.unit = (*robot)->text("name");
     cell_.robot_type = (*robot)->text("use_robot_type");
+    cell_.file = where_;
+    cell_.line = (*robot)->line;
+    cell_.axes = axes_of(**robot);
     for (const Status& read : {read_base(**robot), read_limits(**robot)}) {
       if (!read) return tl::make_unexpected(read.error());
     }
     read_calibration(**robot);
+    return cell_;
+  }
+
+  Result<ControllerCell> read(const std::vector<SourceFile>& modules, const std::string& unit) {
+    if (const auto found = robot(unit, "--unit says which"); !found) return tl::make_unexpected(found.error());
     if (const Status read = read_modules(modules); !read) return tl::make_unexpected(read.error());
     return std::move(cell_);
   }
 
  private:
-  Result<const ParameterInstance*> choose(const std::string& unit) const {
+  Result<const ParameterInstance*> choose(const std::string& unit, const std::string& next) const {
     std::vector<const ParameterInstance*> robots;
     std::vector<std::string> names;
     for (const ParameterInstance& one : instances_) {
@@ -80,7 +89,15 @@ class Backup {
         .in(where_)
         .of("ROBOT")
         .with_text(unit)
-        .next("--unit says which");
+        .next(next);
+  }
+
+  /// `use_joint_0`, ...: a SCARA has four. No robot has fewer than three, so parameters that name fewer do not say it.
+  static int axes_of(const ParameterInstance& robot) {
+    constexpr int kFewest = 3;
+    int named = 0;
+    for (std::size_t k = 0; k < kAxes; ++k) named += robot.text(fmt::format("use_joint_{}", k)).empty() ? 0 : 1;
+    return named >= kFewest ? named : 0;
   }
 
   /// The number of an attribute; `otherwise` where it is left at what the controller takes by default.
@@ -117,9 +134,9 @@ class Backup {
           .beyond(q.norm(), 1);
     }
     cell_.X_WB = make_pose(q.normalized().toRotationMatrix(), {v[0], v[1], v[2]});
-    if (!robot.text("base_frame_coordinated").empty())
-      cell_.notes.push_back(
-          fmt::format("{} carries the robot: its base frame moves", shown(robot.text("base_frame_coordinated"))));
+    cell_.carried_by = robot.text("base_frame_coordinated");
+    if (!cell_.carried_by.empty())
+      cell_.notes.push_back(fmt::format("{} carries the robot: its base frame moves", shown(cell_.carried_by)));
     return {};
   }
 
@@ -292,6 +309,41 @@ void compare_limits(const ControllerCell& controller, const Cell& cell, std::vec
 }
 
 }  // namespace
+
+Result<ControllerRobot> read_controller_robot(const std::string& parameters, const std::string& where,
+                                              const std::string& unit, const std::string& next) {
+  return Backup(parameters, where).robot(unit, next);
+}
+
+std::string unit_of_task(const std::string& parameters, const std::string& task) {
+  const auto number_of = [](const std::string& name) {
+    const std::size_t last = name.find_last_not_of("0123456789");
+    return last == std::string::npos ? name : name.substr(last + 1);
+  };
+  std::vector<std::string> robots;
+  for (const ParameterInstance& one : parameter_instances(parameters)) {
+    if (one.type == "ROBOT") robots.push_back(one.text("name"));
+  }
+  if (robots.size() < 2 || number_of(task).empty()) return "";
+  const auto same = std::find_if(robots.begin(), robots.end(),
+                                 [&](const std::string& robot) { return number_of(robot) == number_of(task); });
+  return same == robots.end() ? "" : *same;
+}
+
+StatedRobot stated_by(const ControllerRobot& robot) {
+  StatedRobot stated;
+  if (robot.carried_by.empty()) stated.bases.push_back({robot.X_WB, "base_frame", robot.file, robot.line});
+  if (robot.axes > 0)
+    stated.numbers.push_back({ArmNumber::kAxes, static_cast<double>(robot.axes), "use_joint", robot.file, robot.line});
+  if (!robot.robot_type.empty()) stated.types.push_back({robot.robot_type, "use_robot_type", robot.file, robot.line});
+  return stated;
+}
+
+Status check_robot(const ControllerRobot& controller, const Chain& robot) {
+  Program program;
+  take_stated(stated_by(controller), program);
+  return check_stated_robot(program, robot);
+}
 
 Result<ControllerCell> read_backup(const std::string& parameters, const std::string& where,
                                    const std::vector<SourceFile>& modules, const std::string& unit) {

@@ -12,28 +12,46 @@
 /// A cell as an ABB controller has it: its backup holds the system parameters (SYSPAR/MOC.cfg) and the modules.
 namespace trammel::cam {
 
-/// A tool, work object or load of a module.
+/// A robot as the system parameters have it.
+struct ControllerRobot {
+  std::string unit;                               ///< mechanical unit: `ROB_1`
+  std::string robot_type;                         ///< as the parameters name it
+  std::string file;                               ///< the parameters
+  int line = 0;                                   ///< of the robot in them
+  int axes = 0;                                   ///< that it names; 0: not known
+  Pose X_WB = Pose::Identity();                   ///< base frame, seen from the controller's world
+  std::string carried_by;                         ///< the unit that moves the base frame; empty: none does
+  std::vector<std::pair<double, double>> limits;  ///< rad, of each axis; empty where the parameters do not say all
+  bool controller_compensates = false;            ///< Absolute Accuracy is in use
+  std::vector<std::string> notes;                 ///< what was passed over, and why
+};
+
+/// `parameters`: the text of MOC.cfg, called `where` in errors. `unit`: the robot; empty: the only one. Refuses
+/// parameters without a robot, several robots where none is chosen (`next` says how one is), and numbers that are none.
+[[nodiscard]] Result<ControllerRobot> read_controller_robot(const std::string& parameters, const std::string& where,
+                                                            const std::string& unit, const std::string& next);
+/// The robot of a task of RAPID, by their numbers: `ROB_2` of `TASK2`; empty: none has it, or there is but one robot.
+[[nodiscard]] std::string unit_of_task(const std::string& parameters, const std::string& task);
+/// Where the robot stands, unless another unit carries it, its axes and its type.
+[[nodiscard]] StatedRobot stated_by(const ControllerRobot& robot);
+/// Refuses parameters of a robot of another type, or with another number of axes.
+[[nodiscard]] Status check_robot(const ControllerRobot& controller, const Chain& robot);
+
+/// A tool of a module.
 struct StatedTool {
   Pose X_FT = Pose::Identity();
   std::optional<StatedLoad> load;  ///< empty where it is a placeholder
   std::string where;               ///< `TASK1/SYSMOD/user.sys line 12`
 };
 
-struct ControllerCell {
-  std::string unit;                               ///< mechanical unit: `ROB_1`
-  std::string robot_type;                         ///< as the parameters name it
-  Pose X_WB = Pose::Identity();                   ///< base frame, seen from the controller's world
-  std::vector<std::pair<double, double>> limits;  ///< rad, of each axis; empty where the parameters do not say all
-  bool controller_compensates = false;            ///< Absolute Accuracy is in use
-  std::map<std::string, StatedTool> tools;        ///< that the robot holds, by name
-  std::map<std::string, Pose> frames;             ///< X_BO of work objects that stand still, by name
-  std::map<std::string, StatedLoad> loads;        ///< loaddata
-  std::vector<std::string> notes;                 ///< what was passed over, and why
+struct ControllerCell : ControllerRobot {
+  std::map<std::string, StatedTool> tools;  ///< that the robot holds, by name
+  std::map<std::string, Pose> frames;       ///< X_BO of work objects that stand still, by name
+  std::map<std::string, StatedLoad> loads;  ///< loaddata
 };
 
-/// `parameters`: the text of MOC.cfg, called `where` in errors. `unit`: the robot; empty: the only one. Refuses
-/// parameters without a robot, several robots where none is chosen, numbers that are none, and a tool that has two
-/// values in the modules; a work object or load that has two is left out, with a note. W of the backup's numbers is the
+/// The robot, and what the modules declare. Refuses what read_controller_robot() does, and a tool that has two values
+/// in the modules; a work object or load that has two is left out, with a note. W of the backup's numbers is the
 /// controller's world.
 [[nodiscard]] Result<ControllerCell> read_backup(const std::string& parameters, const std::string& where,
                                                  const std::vector<SourceFile>& modules, const std::string& unit);

@@ -45,6 +45,7 @@ struct Register {
 struct Selected {
   std::string frame, tool;
   std::string beside;  ///< a program that may select another one at any time, as the statement that starts it; or empty
+  std::string follows;  ///< what moves the targets at run time, `Track TAST[1]`; or empty
   bool operator==(const Selected&) const = default;
 };
 /// What all programs of a controller share.
@@ -82,6 +83,7 @@ class File {
     program_.mark_places.push_back({motions.begin, "   0:  !", " ;", true});
     read_positions(pieces_of(text_, positions.begin, positions.end, positions.line, {"", "'\""}));
     read_statements(motions);
+    note_line_tracking(part_of("/APPL"));
     for (const Pieces& statement : statements_) note_setting(statement);
   }
 
@@ -222,6 +224,17 @@ class File {
     }
   }
 
+  /// `LINE_TRACK_SCHEDULE_NUMBER : 1` in /APPL; 0 is none.
+  void note_line_tracking(const Part& part) {
+    const Pieces pieces = pieces_of(text_, part.begin, part.end, part.line, {"", "'\""});
+    bool scheduled = true;
+    for (std::size_t at = 0; at < pieces.size(); ++at) {
+      if (pieces[at].is("LINE_TRACK")) line_tracking_ = pieces[at].line;
+      if (pieces[at].is("LINE_TRACK_SCHEDULE_NUMBER") && at + 2 < pieces.size()) scheduled = !pieces[at + 2].is("0");
+    }
+    if (!scheduled) line_tracking_ = 0;
+  }
+
   static Step step_of(const Pieces& statement) {
     using Kind = Step::Kind;
     if (statement.empty()) return {};
@@ -250,6 +263,11 @@ class File {
     const bool names = statement.size() > 2 && (statement[0].is("ERROR_PROG") || statement[0].is("RESUME_PROG"));
     if (monitors) selected.beside = fmt::format("MONITOR {}", shown(statement[1].text));
     if (names) selected.beside = fmt::format("{}={}", statement[0].text, shown(statement[2].text));
+    if (statement.size() > 1 && (statement[0].is("Track") || statement[0].is("TRACK"))) {
+      const bool ends = statement[1].is("End") || statement[1].is("END");
+      selected.follows =
+          ends ? "" : fmt::format("{} {} (line {})", statement[0].text, shown(statement[1].text), statement[0].line);
+    }
     for (std::size_t at = 0; at + 1 < statement.size(); ++at) {
       if (!statement[at].is("CALL") && !statement[at].is("RUN")) continue;
       selected.frame = selected.tool =
@@ -269,6 +287,7 @@ class File {
     if (state.frame != other.frame) state.frame = why;
     if (state.tool != other.tool) state.tool = why;
     if (state.beside.empty()) state.beside = other.beside;
+    if (state.follows.empty()) state.follows = other.follows;
   }
   /// What is selected where a program beside may select another one.
   static std::string with(const std::string& selected, const std::string& beside) {
@@ -450,7 +469,12 @@ class File {
     last_motion_ = std::string(statement[0].text);
     note_speed(statement);
     std::string why;
+    if (line_tracking_ != 0)
+      why = fmt::format("LINE_TRACK (line {}): it is seen from a conveyor that moves, not from the user frame",
+                        line_tracking_);
+    if (!selected.follows.empty()) why = selected.follows + " moves it at run time";
     for (const Piece& piece : statement) {
+      if (piece.is("Track") || piece.is("TRACK")) why = fmt::format("{} moves it at run time", piece.text);
       if (piece.is("Offset") || piece.is("OFFSET") || piece.is("Tool_Offset") || piece.is("TOOL_OFFSET") ||
           piece.is("VOFFSET") || piece.is("INC"))
         why = fmt::format("{} displaces it at run time", piece.text);
@@ -551,6 +575,7 @@ class File {
   std::map<std::string, std::size_t> by_name_;
   std::vector<Pieces> statements_;
   std::string last_motion_;
+  int line_tracking_ = 0;  ///< the line that says so; 0: none does
   std::set<std::size_t> used_;
 };
 

@@ -45,6 +45,7 @@ class Job {
       if (line.starts_with("NOP") && instructions && program_.mark_places[index_].at == text_.size())
         program_.mark_places[index_].at = std::min(end + 1, text_.size());
       if (line.starts_with("//NAME ")) name_ = value_behind(line);
+      if (line.starts_with("///GROUP1 ")) group_ = value_behind(line);
       if (instructions)
         statements_.push_back({begin, end, number});
       else
@@ -106,7 +107,7 @@ class Job {
 
   void list_unused() {
     for (const auto& [name, position] : positions_) {
-      if (!used_.contains(name))
+      if (!used_.contains(name) && name[0] == 'C')
         program_.left.push_back({name, index_, position.line, "", "no motion in this job goes to it"});
     }
   }
@@ -124,7 +125,7 @@ class Job {
       target.rewrites.push_back({{position.numbers[k].begin, position.numbers[k].end}, {}, {{k, written->style}}});
     }
     target.configuration = configuration_of(position.conf);
-    return "";
+    return take_external(site, target);
   }
 
  private:
@@ -133,6 +134,12 @@ class Job {
     if (at == std::string_view::npos) return "";
     const std::size_t end = line.find_last_not_of(" \t\r");
     return std::string(line.substr(at + 1, end - at));
+  }
+
+  /// `C00000`, and the external axes of the same place: `BC00000` that carry the robot, `EC00000` that carry the part.
+  static bool names_position(std::string_view text) {
+    const std::size_t letter = !text.empty() && (text[0] == 'B' || text[0] == 'E') ? 1 : 0;
+    return text.size() > letter + 1 && text[letter] == 'C' && text[letter + 1] >= '0' && text[letter + 1] <= '9';
   }
 
   void header(std::string_view line, std::size_t begin, std::size_t end, int number) {
@@ -147,7 +154,7 @@ class Job {
       }
     }
     const std::size_t equals = line.find('=');
-    if (line.empty() || line[0] != 'C' || equals == std::string_view::npos || equals < 2) return;
+    if (!names_position(line) || equals == std::string_view::npos) return;
     Position position = now_;
     position.begin = begin;
     position.line = number;
@@ -155,6 +162,37 @@ class Job {
       if (piece.kind == Piece::Kind::kNumber) position.numbers.push_back(piece);
     }
     positions_.emplace(std::string(line.substr(0, equals)), std::move(position));
+  }
+
+  /// What stands behind the position in a motion; `BP001` is a variable.
+  static bool is_external(const Piece& piece) {
+    return piece.kind == Piece::Kind::kWord && piece.text.size() > 2 &&
+           (piece.text[0] == 'B' || piece.text[0] == 'E') &&
+           (piece.text[1] == 'C' || piece.text[1] == 'P' || piece.text[1] == 'X') && piece.text[2] >= '0' &&
+           piece.text[2] <= '9';
+  }
+
+  /// Where the axes stand that carry the robot or the part, as the motions to a position say. They are in pulses: it
+  /// can only be told whether they move.
+  std::string take_external(const Site& site, ProgramTarget& target) const {
+    std::optional<std::map<int, double>> all;
+    for (const SiteUse& use : site.uses) {
+      std::map<int, double> now;
+      const auto names = external_of_.find(use.move);
+      for (const std::string& name : names == external_of_.end() ? std::vector<std::string>{} : names->second) {
+        const auto known = positions_.find(name);
+        if (known == positions_.end()) return fmt::format("{} is a variable, which any job may set", shown(name));
+        const bool base = name[0] == 'B';
+        for (std::size_t k = 0; k < known->second.numbers.size() && k < 6; ++k) {
+          now[(base ? kFirstBaseAxis : kFirstStationAxis) + static_cast<int>(k)] =
+              read_number(known->second.numbers[k].text).value_or(WrittenNumber{}).value;
+        }
+      }
+      if (all && *all != now) return "motions come to it with external axes at different places";
+      all = now;
+    }
+    if (all) target.external = std::move(*all);
+    return "";
   }
 
   std::size_t tool_of(const Position& position) {
@@ -234,10 +272,16 @@ class Job {
       if (piece.is("UNTIL") || piece.is("SRCH"))
         return leave(fmt::format("a sensor may end the motion ({})", piece.text));
     }
+    if (group_.starts_with("RB") && group_.substr(0, group_.find(',')) != "RB1")
+      return leave(fmt::format("the job moves {}, another robot", shown(group_.substr(0, group_.find(',')))));
     if (word == "IMOV") return leave("it is relative to where the robot is");
     if (shifted_at != 0) return leave(fmt::format("SFTON displaces it (line {})", shifted_at));
     const auto position = positions_.find(name);
     if (position == positions_.end()) return leave("it is a variable, which any job may set");
+    if (name[0] != 'C') return leave("it moves external axes alone");
+    for (std::size_t at = 2; at < pieces.size(); ++at) {
+      if (is_external(pieces[at])) external_of_[program_.moves.size() - 1].emplace_back(pieces[at].text);
+    }
     used_.insert(name);
     sites_.add(index_, position->second.begin, name,
                {tool_of(position->second), frame_of(position->second), word, index_, number, program_.moves.size() - 1,
@@ -277,7 +321,8 @@ class Job {
   Position now_;
   std::map<std::string, Position> positions_;
   std::set<std::string> used_;
-  std::string name_, last_motion_;
+  std::string name_, last_motion_, group_;
+  std::map<std::size_t, std::vector<std::string>> external_of_;  ///< names, by the motion
   std::vector<Statement> statements_;
   const std::map<std::string, std::string>* set_ = nullptr;
 };

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 
@@ -57,6 +58,20 @@ bool only_reads(const std::string& name) {
     if (name.starts_with(beginning)) return true;
   }
   return false;
+}
+
+bool is_literal(const Expression& expression) {
+  switch (expression.kind) {
+    case Kind::kNumber:
+    case Kind::kText:
+    case Kind::kTruth:
+      return true;
+    case Kind::kUnary:
+    case Kind::kAggregate:
+      return std::all_of(expression.parts.begin(), expression.parts.end(), is_literal);
+    default:
+      return false;
+  }
 }
 
 /// The name whose value an expression is a part of.
@@ -174,9 +189,14 @@ void Interpreter::note_changes() {
     for (const Assignment& assignment : modules_[m].assignments) {
       const Expression* root = root_of(assignment.target);
       if (root == nullptr) continue;
-      note_change(assignment.target, *own_scope(m, assignment.routine),
-                  fmt::format("{} is set at run time ({})", text_of(*root, {m, assignment.routine}),
-                              place_of(m, assignment.line)));
+      const std::string why = fmt::format("{} is set at run time ({})", text_of(*root, {m, assignment.routine}),
+                                          place_of(m, assignment.line));
+      if (auto part = constant_part(assignment, m)) {
+        set_in_order_.emplace(part->of, why);
+        parts_.emplace(&assignment, std::move(*part));
+      } else {
+        note_change(assignment.target, *own_scope(m, assignment.routine), why);
+      }
     }
   }
   // A change of a parameter changes what is handed over, through any number of calls.
@@ -187,6 +207,71 @@ void Interpreter::note_changes() {
       for (const Instruction& instruction : modules_[m].instructions) note_changes_by(m, instruction);
     }
   } while (changed_.size() > before);
+}
+
+std::optional<std::vector<std::size_t>> Interpreter::fields_of(const Expression& target, const std::string& type,
+                                                               std::size_t module) const {
+  if (target.kind == Kind::kName) return std::vector<std::size_t>{};
+  if (target.kind != Kind::kField) return std::nullopt;
+  std::optional<std::vector<std::size_t>> fields = fields_of(target.parts[0], type, module);
+  std::string inner = type;
+  for (std::size_t k = 0; fields && k < fields->size(); ++k) inner = built_in().at(inner)[(*fields)[k]].type;
+  const auto known = fields ? field(inner, target.name, module) : std::nullopt;
+  if (!known || !built_in().contains(inner)) return std::nullopt;
+  fields->push_back(known->index);
+  return fields;
+}
+
+std::optional<Interpreter::Part> Interpreter::constant_part(const Assignment& assignment, std::size_t module) const {
+  const Expression* root = root_of(assignment.target);
+  const auto found = root == nullptr ? std::nullopt : find(root->name, {module, assignment.routine});
+  if (!found || found->module != module || !is_literal(assignment.value)) return std::nullopt;
+  const Declaration& declared = *found->declaration;
+  const bool is_setting = declared.type == "tooldata" || declared.type == "wobjdata";
+  // A function comes in within expressions, whose order is not followed.
+  if (assignment.routine >= 0 && modules_[module].routines[static_cast<std::size_t>(assignment.routine)].is_function)
+    return std::nullopt;
+  if (!is_setting || declared.is_array || (declared.storage != Storage::kPers && declared.storage != Storage::kVar))
+    return std::nullopt;
+  auto fields = fields_of(assignment.target, declared.type, module);
+  if (!fields) return std::nullopt;
+  return Part{&declared, std::move(*fields)};
+}
+
+void Interpreter::set(const Assignment& assignment, Settings& settings) const {
+  const Part& part = parts_.at(&assignment);
+  auto& of = settings[part.of];
+  const std::vector<std::size_t>& fields = part.fields;
+  std::erase_if(of, [&](const auto& set) {
+    return set.first.size() >= fields.size() && std::equal(fields.begin(), fields.end(), set.first.begin());
+  });
+  of[fields] = &assignment;
+}
+
+/// The value that holds now, as if the declaration had it.
+Told<const Expression*> Interpreter::as_set(const Declaration& declared) const {
+  const std::string& where = set_in_order_.at(&declared);
+  if (now_ == nullptr) return because(where);
+  const auto settings = now_->find(&declared);
+  if (settings == now_->end()) {
+    if (!declared.value) return because(fmt::format("{} has no value in the file", shown(declared.spelled)));
+    return &*declared.value;
+  }
+  const auto known = as_set_.find({&declared, settings->second});
+  if (known != as_set_.end()) return known->second.get();
+  auto made = std::make_unique<Expression>(declared.value.value_or(Expression{}));
+  for (const auto& [fields, assignment] : settings->second) {
+    if (assignment == nullptr) return because(where + ": a branch, a loop or a caller decides it");
+    Expression* part = made.get();
+    for (const std::size_t field : fields) {
+      if (part->kind != Kind::kAggregate || field >= part->parts.size()) return because(where);
+      part = &part->parts[field];
+    }
+    const int line = std::max(made->line, assignment->line);
+    *part = assignment->value;
+    made->line = line;
+  }
+  return as_set_.emplace(std::pair(&declared, settings->second), std::move(made)).first->second.get();
 }
 
 void Interpreter::note_changes_by(std::size_t module, const Instruction& instruction) {
@@ -320,9 +405,14 @@ Told<std::vector<Data>> Interpreter::data_of(const Expression& expression, const
         return std::vector<Data>{{*argument, scope.caller, declared.type, nullptr}};
       }
       if (const std::string why = changed(&declared); !why.empty()) return because(why);
-      if (!declared.value) return because(fmt::format("{} has no value in the file", shown(declared.spelled)));
       // What a declaration says is looked up where it stands.
       const Scope* where = declared.routine >= 0 ? &scope : own_.at({found->module, -1});
+      if (set_in_order_.contains(&declared)) {
+        const Told<const Expression*> now = as_set(declared);
+        if (!now) return because(now.error());
+        return std::vector<Data>{{*now, where, declared.type, &declared}};
+      }
+      if (!declared.value) return because(fmt::format("{} has no value in the file", shown(declared.spelled)));
       return std::vector<Data>{{&*declared.value, where, declared.type, &declared}};
     }
     case Kind::kField:

@@ -53,6 +53,10 @@ struct JointValue {
   int decimals = 0;
 };
 
+/// What assignments have made of tools and work objects, by the part of them, `tframe.trans` as the numbers of its
+/// fields; nullptr: on some ways another one.
+using Settings = std::map<const Declaration*, std::map<std::vector<std::size_t>, const Assignment*>>;
+
 constexpr double kNoAxis = 8.9e9;  ///< an external axis that is at 9E9 is not there
 
 class Interpreter {
@@ -74,6 +78,12 @@ class Interpreter {
   /// Why a declared value may be another one at run time; empty: it is never changed.
   [[nodiscard]] std::string changed(const Declaration* declaration) const;
 
+  /// Whether an assignment gives a tool or work object a constant, which holds until the next one.
+  [[nodiscard]] bool sets(const Assignment& assignment) const { return parts_.contains(&assignment); }
+  void set(const Assignment& assignment, Settings& settings) const;
+  /// What holds for the expressions that are asked for next.
+  void assume(const Settings& settings) { now_ = &settings; }
+
   /// What an expression stands for: its literal. Several where an index is not constant.
   [[nodiscard]] Told<std::vector<Data>> data_of(const Expression& expression, const Scope& scope, int depth = 0) const;
   [[nodiscard]] Told<double> number_of(const Expression& expression, const Scope& scope, int depth = 0) const;
@@ -94,6 +104,15 @@ class Interpreter {
  private:
   void note_changes();
   void note_change(const Expression& target, const Scope& scope, const std::string& why);
+  /// The part of a tool or work object of the same module that a constant is assigned to.
+  struct Part {
+    const Declaration* of = nullptr;
+    std::vector<std::size_t> fields;
+  };
+  [[nodiscard]] std::optional<Part> constant_part(const Assignment& assignment, std::size_t module) const;
+  [[nodiscard]] std::optional<std::vector<std::size_t>> fields_of(const Expression& target, const std::string& type,
+                                                                  std::size_t module) const;
+  [[nodiscard]] Told<const Expression*> as_set(const Declaration& declared) const;
   void note_changes_by(std::size_t module, const Instruction& instruction);
   [[nodiscard]] const Scope* own_scope(std::size_t module, int routine);
   [[nodiscard]] Told<const Expression*> bound(const Declaration& parameter, const Scope& scope) const;
@@ -113,6 +132,10 @@ class Interpreter {
   std::map<std::string, Found> global_;
   std::unordered_map<std::string, std::vector<std::pair<std::size_t, int>>> routines_;  ///< by name, in their order
   std::map<const Declaration*, std::string> changed_;
+  std::map<const Declaration*, std::string> set_in_order_;  ///< where, of those that constants alone are assigned to
+  std::map<const Assignment*, Part> parts_;
+  const Settings* now_ = nullptr;
+  mutable std::map<std::pair<const Declaration*, Settings::mapped_type>, std::unique_ptr<Expression>> as_set_;
   std::vector<std::unique_ptr<Scope>> scopes_;
   std::map<std::pair<std::size_t, int>, std::vector<const Scope*>> ways_in_;
   std::map<std::pair<std::size_t, int>, const Scope*> own_;

@@ -49,6 +49,7 @@ struct Use {
   std::size_t module = 0;
   std::size_t move = 0;  ///< of Program::moves
   Data data;
+  std::string external_displaced = {};  ///< why external axes are not where the target has them; empty: they are
 };
 
 /// Bytes that hold a target, and what uses them.
@@ -137,14 +138,25 @@ class Reader {
   static bool displaces(const Instruction& instruction) {
     return instruction.name == "pdispon" || instruction.name == "pdispset";
   }
+  static bool displaces_external(const Instruction& instruction) {
+    return instruction.name == "eoffson" || instruction.name == "eoffsset";
+  }
   std::string displacement(std::size_t module, const Instruction& instruction) const {
-    return fmt::format("{} displaces it ({})", instruction.spelled, meaning_->place_of(module, instruction.line));
+    const char* what = displaces_external(instruction) ? "its external axes" : "it";
+    return fmt::format("{} displaces {} ({})", instruction.spelled, what, meaning_->place_of(module, instruction.line));
+  }
+  std::size_t known_displacement(const std::string& why) {
+    const auto known = std::find(displacements_.begin(), displacements_.end(), why);
+    if (known != displacements_.end()) return static_cast<std::size_t>(known - displacements_.begin());
+    displacements_.push_back(why);
+    return displacements_.size() - 1;
   }
 
   /// An instruction, or a word that decides the order.
   struct Place {
     std::size_t module = 0;
-    const Instruction* instruction = nullptr;  ///< nullptr: a word
+    const Instruction* instruction = nullptr;  ///< nullptr: a word, or an assignment
+    const Assignment* assignment = nullptr;
   };
 
   /// The statements of all modules in a row.
@@ -155,18 +167,29 @@ class Reader {
       all.second.push_back(place);
     };
     for (std::size_t m = 0; m < modules_.size(); ++m) {
-      auto turn = modules_[m].turns.begin();
+      std::size_t turn = 0, assigned = 0;
+      const std::vector<Turn>& turns = modules_[m].turns;
+      const std::vector<Assignment>& assignments = modules_[m].assignments;
       const auto add_turns = [&](std::size_t before) {
-        for (; turn != modules_[m].turns.end() && turn->before <= before; ++turn) {
-          Step step = turn->step;
-          if (step.kind == Step::Kind::kRoutine) step.label = fmt::format("{}:{}", m, step.label);
-          add(std::move(step), {m, nullptr});
+        for (;;) {
+          if (assigned < assignments.size() && assignments[assigned].before <= before &&
+              assignments[assigned].turns <= turn) {
+            if (meaning_->sets(assignments[assigned]))
+              add({Step::Kind::kPlain, "", true}, {m, nullptr, &assignments[assigned]});
+            ++assigned;
+          } else if (turn < turns.size() && turns[turn].before <= before) {
+            Step step = turns[turn++].step;
+            if (step.kind == Step::Kind::kRoutine) step.label = fmt::format("{}:{}", m, step.label);
+            add(std::move(step), {m});
+          } else {
+            return;
+          }
         }
       };
       const std::vector<Instruction>& instructions = modules_[m].instructions;
       for (std::size_t i = 0; i < instructions.size(); ++i) {
         add_turns(i);
-        add(step_of(m, instructions[i]), {m, &instructions[i]});
+        add(step_of(m, instructions[i]), {m, &instructions[i], nullptr});
       }
       add_turns(instructions.size());
     }
@@ -187,26 +210,69 @@ class Reader {
     return {Step::Kind::kCall, fmt::format("{}:{}", routine->first, routine->second)};
   }
 
+  /// Whether the controller goes to the configuration of a target, or stays as near as it can.
+  enum class Confs { kOn, kOff, kUndecided };
+
   /// What holds where a motion begins.
   struct State {
-    std::size_t load = 0;       ///< as tools_ numbers them; 0: the tool's own
-    std::size_t displaced = 0;  ///< of displacements_; 0: none
+    std::size_t load = 0;                         ///< as tools_ numbers them; 0: the tool's own
+    std::size_t displaced = 0;                    ///< of displacements_; 0: none
+    std::size_t external_displaced = 0;           ///< the same
+    std::size_t settings = 0;                     ///< of settings_
+    Confs lines = Confs::kOn, axes = Confs::kOn;  ///< ConfL, ConfJ
     bool operator==(const State&) const = default;
   };
 
   void set(const Place& place, State& state) {
+    if (place.assignment != nullptr) {
+      Settings settings = *settings_[state.settings];
+      meaning_->set(*place.assignment, settings);
+      state.settings = known_settings(std::move(settings));
+    }
     if (place.instruction == nullptr) return;
     const Instruction& instruction = *place.instruction;
     if (instruction.name == "gripload") state.load = tools_->load_set(place.module, instruction);
     if (instruction.name == "pdispoff") state.displaced = 0;
-    if (!displaces(instruction)) return;
-    const std::string why = displacement(place.module, instruction);
-    const auto known = std::find(displacements_.begin(), displacements_.end(), why);
-    state.displaced = static_cast<std::size_t>(known - displacements_.begin());
-    if (known == displacements_.end()) displacements_.push_back(why);
+    if (instruction.name == "eoffsoff") state.external_displaced = 0;
+    if (instruction.name == "confl") state.lines = confs_of(instruction);
+    if (instruction.name == "confj") state.axes = confs_of(instruction);
+    if (displaces(instruction)) state.displaced = known_displacement(displacement(place.module, instruction));
+    if (displaces_external(instruction))
+      state.external_displaced = known_displacement(displacement(place.module, instruction));
+  }
+  std::size_t known_settings(Settings settings) {
+    const auto [known, fresh] = settings_at_.emplace(std::move(settings), settings_.size());
+    if (fresh) settings_.push_back(&known->first);
+    return known->second;
+  }
+  /// What holds on both ways; nullptr where they differ.
+  static Settings on_both_ways(const Settings& one, const Settings& other) {
+    Settings both;
+    for (const Settings* settings : {&one, &other}) {
+      const Settings& beside = settings == &one ? other : one;
+      for (const auto& [of, parts] : *settings) {
+        const auto there = beside.find(of);
+        for (const auto& [fields, assignment] : parts) {
+          const auto same = there == beside.end() ? parts.end() : there->second.find(fields);
+          const bool agrees = there != beside.end() && same != there->second.end() && same->second == assignment;
+          both[of][fields] = agrees ? assignment : nullptr;
+        }
+      }
+    }
+    return both;
+  }
+  static Confs confs_of(const Instruction& instruction) {
+    const bool off = std::any_of(instruction.arguments.begin(), instruction.arguments.end(),
+                                 [](const Expression& argument) { return argument.label == "off"; });
+    return off ? Confs::kOff : Confs::kOn;
   }
   void join(State& state, const State& other, const std::string& by) {
     state.displaced = std::max(state.displaced, other.displaced);
+    state.external_displaced = std::max(state.external_displaced, other.external_displaced);
+    if (state.settings != other.settings)
+      state.settings = known_settings(on_both_ways(*settings_[state.settings], *settings_[other.settings]));
+    if (state.lines != other.lines) state.lines = Confs::kUndecided;
+    if (state.axes != other.axes) state.axes = Confs::kUndecided;
     if (state.load == other.load) return;
     state.load = tools_->undecided_load(
         state.load, by.empty() ? "GripLoad: a branch, a loop or a caller decides what the robot carries"
@@ -217,17 +283,45 @@ class Reader {
     const auto found = this->steps();
     const auto& steps = std::get<0>(found);
     const auto& places = std::get<1>(found);
+    std::map<std::size_t, std::size_t> move_of;  // by the step
+    const Flow flow = flow_of(steps, true);
     const std::vector<State> states = states_before(
-        flow_of(steps, true), State{}, [&](std::size_t s, State& state) { set(places[s], state); },
+        flow, State{}, [&](std::size_t s, State& state) { set(places[s], state); },
         [&](State& state, const State& other, const std::string& by) { join(state, other, by); });
     for (std::size_t s = 0; s < steps.size(); ++s) {
       const Instruction* motion = places[s].instruction;
       const std::size_t module = places[s].module;
       if (motion == nullptr || !is_motion(motion->name) || meaning_->find_routine(motion->name, module)) continue;
+      move_of.emplace(s, program_.moves.size());
       program_.moves.push_back({module, motion->line, {}, is_arc(motion->name)});
       state_ = states[s];
+      meaning_->assume(*settings_[state_.settings]);
+      note_confs(module, *motion);
       read_motion(module, *motion);
     }
+    if (!goes_by_joints_before_) return;
+    const auto before = motions_before(flow, [&](std::size_t s) -> std::optional<std::size_t> {
+      const auto move = move_of.find(s);
+      return move == move_of.end() ? std::nullopt : std::optional<std::size_t>(move->second);
+    });
+    for (const auto& [step, move] : move_of) program_.moves[move].before = before[step];
+  }
+
+  /// `ConfL\Off`: the controller stays in the posture before.
+  void note_confs(std::size_t module, const Instruction& motion) {
+    const bool on_a_line = is_linear(motion.name);
+    const Confs confs = on_a_line ? state_.lines : state_.axes;
+    if (confs == Confs::kOn) return;
+    if (confs == Confs::kOff) {
+      program_.moves.back().choice = on_a_line ? JointChoice::kOnALine : JointChoice::kNearest;
+      goes_by_joints_before_ = true;
+      return;
+    }
+    if (undecided_confs_) return;
+    undecided_confs_ = true;
+    program_.notes.push_back(
+        fmt::format("{} ({}): on some ways to it {}\\Off holds, on others not; it is taken to go to its configuration",
+                    motion.spelled, meaning_->place_of(module, motion.line), on_a_line ? "ConfL" : "ConfJ"));
   }
 
   void read_motion(std::size_t module, const Instruction& motion) {
@@ -325,10 +419,12 @@ class Reader {
       if (meaning_->type_of(*handed->first, *handed->second) == "tooldata") return argument;
       if (argument->kind == Kind::kName && argument->name == "tool0") return argument;
     }
-    const bool signal_last = motion.name.ends_with("do") || motion.name.ends_with("ao") ||
+    // `MoveLDO p10,v100,fine,tool1,do1,1`: the tool stands behind the zone.
+    const bool more_behind = motion.name.ends_with("do") || motion.name.ends_with("ao") ||
                              motion.name.ends_with("go") || motion.name.ends_with("sync");
-    if (positional.size() < 3 || signal_last) return nullptr;
-    return positional.back()->kind == Kind::kName ? positional.back() : nullptr;
+    if (positional.size() < 3 || (more_behind && !motion.name.starts_with("move"))) return nullptr;
+    const std::size_t at = !more_behind ? positional.size() - 1 : is_arc(motion.name) ? 4 : 3;
+    return at < positional.size() && positional[at]->kind == Kind::kName ? positional[at] : nullptr;
   }
 
   void use(std::size_t module, const Instruction& motion, const Expression& argument, bool joints, std::size_t tool,
@@ -352,7 +448,8 @@ class Reader {
         site.statement = statement_of(data, where, motion, expression, &argument);
         site.name = all->size() > 1 ? meaning_->text_of(argument, scope) : meaning_->text_of(*expression, *where);
       }
-      site.uses.push_back({tool, frame, &motion, module, program_.moves.size() - 1, data});
+      site.uses.push_back(
+          {tool, frame, &motion, module, program_.moves.size() - 1, data, displacements_[state_.external_displaced]});
     }
   }
 
@@ -457,6 +554,9 @@ class Reader {
     std::string why = read ? "" : read.error();
     if (why.empty()) why = program_.tools[target.tool].why_not;
     if (why.empty()) why = program_.frames[target.frame].why_not;
+    for (const Use* use : uses) {
+      if (why.empty() && !target.external.empty()) why = use->external_displaced;
+    }
     if (!why.empty()) {
       program_.left.push_back({target.name, target.file, target.line, target.motion, why});
       for (const Use* use : uses) program_.moves[use->move].left_some = true;
@@ -694,8 +794,11 @@ class Reader {
   std::set<std::string> named_;
   std::string open_displacement_;
   std::vector<std::string> displacements_ = std::vector<std::string>(1);
+  std::map<Settings, std::size_t> settings_at_ = {{{}, 0}};
+  std::vector<const Settings*> settings_ = {&settings_at_.begin()->first};
   State state_;  ///< of the motion that is read
   bool calls_routine_ = false, moves_ = false;
+  bool goes_by_joints_before_ = false, undecided_confs_ = false;
   std::map<const Declaration*, std::string> read_;  ///< where numbers of a target are read
 };
 

@@ -208,6 +208,7 @@ class Parser {
     const std::string spelled(bytes());
     routine.name = take_word();
     routine.local = local;
+    routine.is_function = kind == "func";
     routine_ = static_cast<int>(module_.routines.size());
     if (kind == "trap")
       turn(Step::Kind::kInterrupt, fmt::format("the TRAP {}", shown(spelled)));
@@ -314,7 +315,8 @@ class Parser {
       Expression value = expression();
       // A value that is not understood changes its target all the same.
       if (!is_sign(";")) value = {};
-      module_.assignments.push_back({std::move(target), std::move(value), routine_, line, value_begin, 0});
+      module_.assignments.push_back({std::move(target), std::move(value), routine_, line, value_begin, 0,
+                                     module_.instructions.size(), module_.turns.size()});
       skip_statement();
       module_.assignments.back().end = last_end();
       return;

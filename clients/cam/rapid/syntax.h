@@ -85,6 +85,8 @@ struct Assignment {
   int routine = -1;
   int line = 0;
   std::size_t begin = 0, end = 0;  ///< of the value
+  std::size_t before = 0;          ///< which instruction of the module
+  std::size_t turns = 0;           ///< of the module, that stand above it
 };
 
 /// What an IF, WHILE, TEST or FOR looks at.
@@ -113,6 +115,7 @@ struct Instruction {
 struct Routine {
   std::string name;
   bool local = false;
+  bool is_function = false;
   std::vector<std::string> parameters;  ///< in order, those with `\` left out
 };
 

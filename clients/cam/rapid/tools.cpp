@@ -74,7 +74,8 @@ std::size_t Tools::known_tool(ProgramTool tool) {
   for (std::size_t k = 0; k < program_.tools.size(); ++k) {
     const ProgramTool& known = program_.tools[k];
     if (in_lower_case(known.name) == in_lower_case(tool.name) && known.file == tool.file && known.line == tool.line &&
-        known.carries == tool.carries)
+        known.carries == tool.carries && known.X_FT.has_value() == tool.X_FT.has_value() &&
+        (!tool.X_FT || known.X_FT->isApprox(*tool.X_FT, 1e-12)))
       return k;
   }
   program_.tools.push_back(std::move(tool));

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
 #include <set>
 #include <tl/expected.hpp>
 
@@ -28,6 +30,7 @@ struct Value {
   std::size_t begin = 0, end = 0;
   int line = 1;
   std::string name;
+  std::string label = {};  ///< of an argument: `qnear=q`
   std::vector<Piece> numbers;
   std::vector<Value> arguments;
 };
@@ -47,11 +50,23 @@ struct Load {
 /// What is set when a motion comes.
 struct State {
   std::size_t tool = 0, load = 0;  ///< load 0: not said
+  int tracks_at = 0;               ///< the line that follows a conveyor; 0: none does
   bool operator==(const State&) const = default;
 };
 
 bool is_motion(const Piece& piece) {
   return piece.is("movel") || piece.is("movej") || piece.is("movep") || piece.is("movec");
+}
+
+/// Moves the arm to where no pose says.
+bool is_followed(const Piece& piece) {
+  static const std::set<std::string_view> kFollows = {"servoj", "servoc",         "speedl",
+                                                      "speedj", "freedrive_mode", "teach_mode"};
+  return kFollows.contains(piece.text);
+}
+
+bool is_function_of_poses(const std::string& name) {
+  return name == "pose_trans" || name == "pose_inv" || name == "pose_add";
 }
 
 class Script {
@@ -72,17 +87,20 @@ class Script {
     Flow flow = flow_of(steps_);
     flow.entries = {0};
     const std::vector<State> states = states_before(
-        flow, State{tool, 0}, [&](std::size_t s, State& state) { set(step_at_[s], state); },
+        flow, State{tool, 0, 0}, [&](std::size_t s, State& state) { set(step_at_[s], state); },
         [&](State& state, const State& other, const std::string& by) { join(state, other, by); });
     for (std::size_t s = 0; s < steps_.size(); ++s) {
       const std::size_t at = step_at_[s];
       if (is_motion(pieces_[at])) {
         tool_ = tool_carrying(states[s]);
+        tracks_at_ = states[s].tracks_at;
+        move_of_.emplace(s, program_.moves.size());
         motion(at);
       }
       if (pieces_[at].is("servoj") || pieces_[at].is("servoc") || pieces_[at].is("speedl"))
         leave(pieces_[at], std::string(pieces_[at].text), "it follows what is computed at run time");
     }
+    note_order(flow);
     for (std::size_t at = 0; at < pieces_.size(); ++at) note_reading(at);
   }
 
@@ -141,8 +159,20 @@ class Script {
     }
   }
 
+  /// The controller takes the joints nearest to those before.
+  void note_order(const Flow& flow) {
+    const auto before = motions_before(flow, [&](std::size_t s) -> std::optional<std::size_t> {
+      if (const auto move = move_of_.find(s); move != move_of_.end()) return move->second;
+      return is_followed(pieces_[step_at_[s]]) ? std::optional<std::size_t>(kNoMotion) : std::nullopt;
+    });
+    for (const auto& [step, move] : move_of_) program_.moves[move].before = before[step];
+  }
+
   void set(std::size_t at, State& state) {
     if (at + 1 >= pieces_.size() || !pieces_[at + 1].is("(")) return;
+    if (pieces_[at].is("track_conveyor_linear") || pieces_[at].is("track_conveyor_circular"))
+      state.tracks_at = pieces_[at].line;
+    if (pieces_[at].is("stop_conveyor_tracking")) state.tracks_at = 0;
     if (pieces_[at].is("set_tcp")) state.tool = tool_set(at);
     if (pieces_[at].is("set_payload") || pieces_[at].is("set_target_payload") || pieces_[at].is("set_payload_mass") ||
         pieces_[at].is("set_payload_cog"))
@@ -150,6 +180,7 @@ class Script {
   }
 
   void join(State& state, const State& other, const std::string& by) {
+    state.tracks_at = std::max(state.tracks_at, other.tracks_at);
     const std::string why =
         by.empty() ? "a branch or a loop of the script decides it" : fmt::format("{} may change it", by);
     if (state.tool != other.tool && program_.tools[state.tool].why_not.empty()) {
@@ -307,7 +338,11 @@ class Script {
             continue;
           }
           const std::size_t before = at;
+          const bool labelled = at + 2 < pieces_.size() && pieces_[at].kind == Piece::Kind::kWord &&
+                                pieces_[at + 1].is("=") && !pieces_[at + 2].is("=");
+          if (labelled) at += 2;
           value.arguments.push_back(value_at(at, depth + 1));
+          if (labelled) value.arguments.back().label = std::string(pieces_[before].text);
           if (at == before) ++at;
         }
         if (at < pieces_.size()) ++at;
@@ -361,20 +396,18 @@ class Script {
   Told<Pose> pose_of_value(const Value& value, int depth) const {
     const Told<Value> now = resolved(value);
     if (!now) return because(now.error());
-    if (now->kind == Value::Kind::kPose) {
-      std::vector<double> numbers;
-      for (const Piece& piece : now->numbers)
-        numbers.push_back(read_number(piece.text).value_or(WrittenNumber{}).value);
-      return pose_of(Coordinates::kRotationVector, numbers);
-    }
-    if (now->kind != Value::Kind::kCall || now->name != "pose_trans" || now->arguments.size() != 2 || depth > kDeepest)
-      return because(now->kind == Value::Kind::kCall ? fmt::format("the function {} decides it", shown(now->name))
-                                                     : std::string("it is not constant"));
+    if (now->kind == Value::Kind::kPose) return pose_of(Coordinates::kRotationVector, numbers_in(*now));
+    if (now->kind != Value::Kind::kCall) return because("it is not constant");
+    const std::size_t due = now->name == "pose_inv" ? 1 : 2;
+    if (!is_function_of_poses(now->name) || now->arguments.size() != due || depth > kDeepest)
+      return because(fmt::format("the function {} decides it", shown(now->name)));
     const Told<Pose> left = pose_of_value(now->arguments[0], depth + 1);
     if (!left) return left;
+    if (due == 1) return left->inverse();
     const Told<Pose> right = pose_of_value(now->arguments[1], depth + 1);
     if (!right) return right;
-    return *left * *right;
+    if (now->name == "pose_trans") return *left * *right;
+    return make_pose(left->linear() * right->linear(), left->translation() + right->translation());
   }
 
   std::size_t tool_set(std::size_t at) {
@@ -400,20 +433,51 @@ class Script {
   void motion(std::size_t at) {
     if (program_.frames.empty()) program_.frames.push_back({"base", Pose::Identity(), ""});
     program_.moves.push_back({index_, pieces_[at].line, {}, false});
-    program_.moves.back().is_arc = pieces_[at].is("movec");
+    ProgramMove& move = program_.moves.back();
+    move.is_arc = pieces_[at].is("movec");
+    move.choice = pieces_[at].is("movej") ? JointChoice::kNearest : JointChoice::kOnALine;
     std::size_t next = at + 2;
     const int count = pieces_[at].is("movec") ? 2 : 1;
     for (int k = 0; k < count; ++k) {
       Value value = value_at(next);
       // The joints of a pose are those of the pose.
+      std::string why;
       if (value.kind == Value::Kind::kCall && value.name == "get_inverse_kin" && !value.arguments.empty())
-        value = Value(value.arguments[0]);
+        why = take_inverse(value, move);
       else if (!ends_here(next, pieces_[at].line) && next < pieces_.size() && !pieces_[next].is(","))
         value.kind = Value::Kind::kOther;
-      use(at, value);
+      if (tracks_at_ != 0) why = fmt::format("it is seen from a conveyor that moves (line {})", tracks_at_);
+      if (why.empty())
+        use(at, value);
+      else
+        leave(pieces_[at], text_.substr(value.begin, value.end - value.begin), why);
       if (next < pieces_.size() && pieces_[next].is(",")) ++next;
     }
     note_speed(at, next);
+  }
+
+  /// `get_inverse_kin(p, qnear=q)`: what stands for its pose, and the joints that the motion is to be near to. Returns
+  /// why it is not known; empty: it is.
+  std::string take_inverse(Value& value, ProgramMove& move) const {
+    const std::vector<Value> arguments = std::move(value.arguments);
+    value = arguments[0];
+    for (std::size_t k = 1; k < arguments.size(); ++k) {
+      const Value& argument = arguments[k];
+      if (argument.label == "tcp" || (argument.label.empty() && k == 4)) return "get_inverse_kin is given another tool";
+      if (argument.label != "qnear" && (!argument.label.empty() || k > 1)) continue;
+      if (argument.kind == Value::Kind::kCall && argument.name == "get_actual_joint_positions") continue;
+      const Told<Value> near = resolved(argument);
+      if (!near) return near.error();
+      if (near->kind != Value::Kind::kJoints) return "the joints that it is to be near to are not constant";
+      if (move.choice == JointChoice::kNearest) move.near = numbers_in(*near);
+    }
+    return "";
+  }
+
+  static std::vector<double> numbers_in(const Value& value) {
+    std::vector<double> numbers;
+    for (const Piece& piece : value.numbers) numbers.push_back(read_number(piece.text).value_or(WrittenNumber{}).value);
+    return numbers;
   }
 
   /// `v=0.1`, or the second number behind the target, m/s, of a motion of the tool.
@@ -435,7 +499,7 @@ class Script {
     const Told<Value> now = resolved(value);
     if (!now) return leave(pieces_[at], name, now.error());
     const bool readable = now->kind == Value::Kind::kPose || now->kind == Value::Kind::kJoints ||
-                          (now->kind == Value::Kind::kCall && now->name == "pose_trans");
+                          (now->kind == Value::Kind::kCall && is_function_of_poses(now->name));
     if (!readable) {
       return leave(pieces_[at], name,
                    now->kind == Value::Kind::kCall ? fmt::format("the function {} decides it", shown(now->name))
@@ -486,8 +550,10 @@ class Script {
   std::vector<std::size_t> step_at_;  ///< the piece of each
   std::vector<Load> loads_ = std::vector<Load>(1);
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> carrying_;
-  std::map<std::size_t, std::string> read_;  ///< why the numbers at a place must stay
-  std::size_t tool_ = 0;
+  std::map<std::size_t, std::string> read_;     ///< why the numbers at a place must stay
+  std::size_t tool_ = 0;                        ///< of the motion that is read
+  int tracks_at_ = 0;                           ///< the same
+  std::map<std::size_t, std::size_t> move_of_;  ///< of Program::moves, by the step
   std::map<std::string, Variable> variables_;
   std::map<std::size_t, Value> values_;
 };

@@ -185,14 +185,15 @@ Result<Corrections> correct_by_service(const TargetFile& file, const ApplyArgume
 /// What correct is asked for, a program or a table of targets.
 struct CorrectArguments : ApplyArguments {
   std::vector<std::string> inputs;
-  std::string receipt, report, format, frames;
+  std::string receipt, report, format, frames, task;
+  std::vector<std::string> idle_axes;
   bool allow_failed = false, strict = false, keep_digits = false, undo = false, again = false, split = false,
        keep_joints = false;
   double tolerance_mm = 0;
 
   [[nodiscard]] CorrectProgramArguments of_program() const {
-    return {inputs,       model,  tool,        payload, format, output, receipt,     report,       json,   frames,
-            allow_failed, strict, keep_digits, undo,    again,  split,  keep_joints, tolerance_mm, service};
+    return {inputs,       model,  tool,        payload, format, output, receipt,     report,       json,    frames,
+            allow_failed, strict, keep_digits, undo,    again,  split,  keep_joints, tolerance_mm, service, idle_axes};
   }
 };
 
@@ -200,6 +201,8 @@ struct CorrectArguments : ApplyArguments {
 Status check_table_usage(const CorrectArguments& arguments) {
   const std::pair<bool, const char*> of_programs[] = {{!arguments.report.empty(), "--report"},
                                                       {!arguments.frames.empty(), "--frames"},
+                                                      {!arguments.idle_axes.empty(), "--idle-axis"},
+                                                      {!arguments.task.empty(), "--task"},
                                                       {arguments.split, "--split"},
                                                       {arguments.keep_digits, "--keep-digits"},
                                                       {arguments.keep_joints, "--keep-joints"},
@@ -282,7 +285,8 @@ CLI::Option* add_apply_options(CLI::App& command, ApplyArguments& arguments) {
 }
 
 /// How a program is read.
-void add_reading_options(CLI::App& command, std::string& format, std::string& frames) {
+void add_reading_options(CLI::App& command, std::string& format, std::string& frames,
+                         std::vector<std::string>& idle_axes, std::string& task) {
   const std::string group = "Programs";
   command
       .add_option("--format", format,
@@ -295,15 +299,27 @@ void add_reading_options(CLI::App& command, std::string& format, std::string& fr
           "name,x_mm,y_mm,z_mm,qw,qx,qy,qz; UFRAME[1], BASE_DATA[2], ...; robot_base: where the robot stands in "
           "the controller's world)")
       ->group(group);
+  command
+      .add_option("--idle-axis", idle_axes,
+                  "External axis that carries neither robot nor part, such as a servo gun, by the name that messages "
+                  "give it: 'group 2, axis 1'; may be given several times")
+      ->allow_extra_args(false)
+      ->group(group);
+  command
+      .add_option("--task", task,
+                  "Of the backup of an ABB controller that moves several robots: the task whose modules are taken, and "
+                  "whose robot (TASK2)")
+      ->group(group);
 }
 
 /// What predict is asked for: joints, or a program.
 struct PredictArguments : ApplyArguments {
   std::vector<std::string> inputs;
-  std::string format, frames;
+  std::string format, frames, task;
+  std::vector<std::string> idle_axes;
 
   [[nodiscard]] PredictProgramArguments of_program() const {
-    return {inputs, model, tool, payload, format, output, json, frames, service};
+    return {inputs, model, tool, payload, format, output, json, frames, service, idle_axes, task};
   }
 };
 
@@ -314,9 +330,11 @@ Status check_usage(const PredictArguments& arguments) {
         .of("--joints")
         .next("name a program, or joints by --joints");
   }
-  if (!program && !(arguments.format.empty() && arguments.frames.empty())) {
-    return failure(ErrorCode::kUsage, "--format and --frames are of programs, not of joints")
-        .of(arguments.format.empty() ? "--frames" : "--format");
+  if (!program && !(arguments.format.empty() && arguments.frames.empty() && arguments.idle_axes.empty())) {
+    return failure(ErrorCode::kUsage, "--format, --frames and --idle-axis are of programs, not of joints")
+        .of(!arguments.format.empty()   ? "--format"
+            : !arguments.frames.empty() ? "--frames"
+                                        : "--idle-axis");
   }
   if (program && (arguments.covariance || arguments.orientation)) {
     return failure(ErrorCode::kUsage, "--covariance and --orientation are of joints, not of programs")
@@ -344,7 +362,7 @@ void add_predict(CLI::App& app, Action& chosen) {
       "--orientation", arguments->orientation,
       "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...); with a model "
       "file only");
-  add_reading_options(*command, arguments->format, arguments->frames);
+  add_reading_options(*command, arguments->format, arguments->frames, arguments->idle_axes, arguments->task);
   add_apply_options(*command, *arguments)->required();
   command->callback([arguments, &chosen] {
     chosen = [arguments]() -> Result<Extent> {
@@ -358,7 +376,7 @@ void add_predict(CLI::App& app, Action& chosen) {
 
 void add_program_options(CLI::App& command, CorrectArguments& arguments) {
   const std::string group = "Programs";
-  add_reading_options(command, arguments.format, arguments.frames);
+  add_reading_options(command, arguments.format, arguments.frames, arguments.idle_axes, arguments.task);
   command.add_option("--report", arguments.report, "The receipt as a page, with the path in 3D (HTML)")->group(group);
   command
       .add_flag("--keep-digits", arguments.keep_digits,

@@ -177,10 +177,16 @@ Result<Extent> import_backup(const BackupArguments& arguments) {
   if (!modules) return tl::make_unexpected(modules.error());
   const auto controller = cam::read_backup(*parameters, moc, *modules, arguments.unit);
   if (!controller) return tl::make_unexpected(advised(controller.error(), arguments));
+  if (!arguments.robot.empty()) {
+    const Result<Chain> robot = read_robot(arguments.robot);
+    if (!robot) return tl::make_unexpected(robot.error());
+    if (const Status same = cam::check_robot(*controller, *robot); !same) return tl::make_unexpected(same.error());
+  }
   std::vector<std::string> differing;
   if (!arguments.compare.empty()) {
     const Result<Cell> cell = read_cell(arguments.compare);
     if (!cell) return tl::make_unexpected(cell.error());
+    if (const Status same = cam::check_robot(*controller, cell->robot); !same) return tl::make_unexpected(same.error());
     const Result<CellRules> rules = rules_of(*cell);
     if (!rules) return tl::make_unexpected(rules.error());
     differing = cam::differences(*controller, *cell, rules->controller_compensates);

@@ -183,13 +183,14 @@ void add_receipts(const Corrected& done, const CorrectProgramArguments& argument
 }
 
 Result<cam::Program> read(const ProgramFiles& files, const CorrectProgramArguments& arguments) {
-  return understood_program(files, {arguments.split, arguments.keep_joints, {}, files.system}, arguments.frames);
+  return understood_program(files, {arguments.split, arguments.keep_joints, {}, files.system, arguments.idle_axes},
+                            arguments.frames);
 }
 
 }  // namespace
 
 Result<Extent> correct_program(const CorrectProgramArguments& arguments) {
-  Result<ProgramFiles> files = read_program_files(arguments.inputs, arguments.format);
+  Result<ProgramFiles> files = read_program_files(arguments.inputs, arguments.format, arguments.task);
   if (!files) return tl::make_unexpected(files.error());
   if (arguments.undo) return undo(*files, arguments);
   if (arguments.again) files = originals_of(*files, true);

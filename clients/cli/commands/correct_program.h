@@ -17,6 +17,8 @@ struct CorrectProgramArguments {
        keep_joints = false;
   double tolerance_mm = 0;  ///< 0: none
   ServiceOptions service;
+  std::vector<std::string> idle_axes = {};
+  std::string task = {};  ///< of an ABB backup
 };
 
 [[nodiscard]] Result<Extent> correct_program(const CorrectProgramArguments& arguments);

@@ -87,10 +87,11 @@ Result<cam::PredictedProgram> predict_by_service(const cam::Program& program,
 }  // namespace
 
 Result<Extent> predict_program(const PredictProgramArguments& arguments) {
-  const Result<ProgramFiles> files = read_program_files(arguments.inputs, arguments.format);
+  const Result<ProgramFiles> files = read_program_files(arguments.inputs, arguments.format, arguments.task);
   if (!files) return tl::make_unexpected(files.error());
   cam::ReadOptions reading;
   reading.split = true;  // nothing is written, so a point may be used in several ways
+  reading.idle_axes = arguments.idle_axes;
   const Result<cam::Program> program = understood_program(*files, reading, arguments.frames);
   if (!program) return tl::make_unexpected(program.error());
   const Result<cam::PredictedProgram> predicted =

@@ -14,6 +14,8 @@ struct PredictProgramArguments {
   std::vector<std::string> inputs;
   std::string model, tool, payload, format, output, json, frames;
   ServiceOptions service;
+  std::vector<std::string> idle_axes = {};
+  std::string task = {};  ///< of an ABB backup
 };
 
 /// A target that nothing can be said of makes it Extent::kPart.

@@ -11,7 +11,9 @@
 #include <iterator>
 #include <set>
 
+#include "clients/cam/backup/backup.h"
 #include "clients/cam/mark.h"
+#include "clients/cam/stated_robot.h"
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
@@ -43,6 +45,12 @@ std::optional<cam::Dialect> dialect_of_found(const std::string& path) {
   return head.find("DEFDAT") == std::string::npos ? std::nullopt : dialect;
 }
 
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
 /// The programs of a folder, by name.
 std::vector<Found> programs_in(const std::string& folder, const std::optional<cam::Dialect>& wanted) {
   std::vector<Found> found;
@@ -64,11 +72,29 @@ bool is_of_the_controller(const std::string& name) {
   static const std::set<std::string> kFolders = {"system", "mada", "steu", "sysmod", "syspar"};
   const fs::path path(name);
   if (path.filename().string().starts_with('$')) return true;
-  return std::any_of(path.begin(), path.end(), [&](const fs::path& part) {
-    std::string lower = part.string();
-    std::transform(lower.begin(), lower.end(), lower.begin(),
-                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    return kFolders.contains(lower);
+  return std::any_of(path.begin(), path.end(),
+                     [&](const fs::path& part) { return kFolders.contains(lower(part.string())); });
+}
+
+/// The system parameters of ABB backups that a folder is, or holds.
+Result<std::vector<cam::SourceFile>> parameters_in(const std::string& folder) {
+  std::vector<cam::SourceFile> found;
+  std::error_code error;
+  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
+    if (lower(it->path().filename().string()) != "moc.cfg" || !it->is_regular_file(error)) continue;
+    Result<std::string> text = read_text_file(it->path().string(), kLargest);
+    if (!text) return tl::make_unexpected(text.error());
+    found.push_back({fs::relative(it->path(), folder, error).string(), std::move(*text)});
+  }
+  return found;
+}
+
+/// Those below the folder of a task.
+void keep_task(const std::string& task, std::vector<Found>& programs) {
+  std::erase_if(programs, [&](const Found& program) {
+    const fs::path path(program.name);
+    return std::none_of(path.begin(), path.end(),
+                        [&](const fs::path& part) { return lower(part.string()) == lower(task); });
   });
 }
 
@@ -92,8 +118,10 @@ bool is_program(const std::vector<std::string>& inputs, const std::string& forma
          cam::dialect_of_file(inputs[0]).has_value();
 }
 
-Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, const std::string& format) {
+Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, const std::string& format,
+                                        const std::string& task) {
   ProgramFiles program;
+  program.task = task;
   const std::optional<cam::Dialect> wanted = cam::dialect_called(format);
   if (!format.empty() && !wanted) {
     return failure(ErrorCode::kUsage, "--format '{}': known are csv, {}", format, cam::dialect_names())
@@ -104,8 +132,14 @@ Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, 
   for (const std::string& input : inputs) {
     std::error_code error;
     if (fs::is_directory(input, error)) {
-      const std::vector<Found> inside = programs_in(input, wanted);
+      std::vector<Found> inside = programs_in(input, wanted);
       if (inside.empty()) return refused("a folder without programs").in(input);
+      if (!task.empty()) keep_task(task, inside);
+      if (inside.empty())
+        return refused("no programs of a task {}", shown(task)).in(input).of("--task").with_text(task);
+      Result<std::vector<cam::SourceFile>> parameters = parameters_in(input);
+      if (!parameters) return tl::make_unexpected(parameters.error());
+      program.parameters.insert(program.parameters.end(), parameters->begin(), parameters->end());
       found.insert(found.end(), inside.begin(), inside.end());
       for (const Found& file : inside)
         if (is_of_the_controller(file.name)) program.system.insert(file.name);
@@ -136,6 +170,7 @@ Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, 
     program.paths.push_back(file.path);
   }
   program.dialect = dialect.value_or(cam::Dialect::kRapid);
+  if (program.dialect != cam::Dialect::kRapid) program.parameters.clear();
   return program;
 }
 
@@ -214,8 +249,27 @@ Status check_used(const std::vector<GivenPose>& rows, const std::string& path, c
 
 }  // namespace
 
+namespace {
+
+/// What an ABB backup says of its robot.
+Result<std::vector<cam::ControllerRobot>> robots_of(const ProgramFiles& files) {
+  std::vector<cam::ControllerRobot> robots;
+  for (const cam::SourceFile& parameters : files.parameters) {
+    auto robot = cam::read_controller_robot(parameters.text, parameters.name,
+                                            cam::unit_of_task(parameters.text, files.task), "--task says which");
+    if (!robot) return tl::make_unexpected(robot.error());
+    robots.push_back(std::move(*robot));
+  }
+  return robots;
+}
+
+}  // namespace
+
 Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOptions options,
                                         const std::string& frames) {
+  const auto robots = robots_of(files);
+  if (!robots) return tl::make_unexpected(robots.error());
+  for (const cam::ControllerRobot& robot : *robots) cam::take_stated(cam::stated_by(robot), options.stated);
   std::vector<GivenPose> rows;
   if (!frames.empty()) {
     Result<std::vector<GivenPose>> given = read_frames_csv(frames);
@@ -224,6 +278,14 @@ Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOpti
   }
   for (const GivenPose& row : rows) options.frames.emplace(row.name, row.X);
   cam::Program program = cam::read_program(files.dialect, files.files, options);
+  for (const cam::ControllerRobot& robot : *robots) {
+    if (!robot.carried_by.empty())
+      program.notes.push_back(
+          fmt::format("{} line {}: {} carries {}, so that where the robot stands is not taken from there", robot.file,
+                      robot.line, shown(robot.carried_by), shown(robot.unit)));
+  }
+  if (const Status idle = cam::take_idle_axes(program, options.idle_axes); !idle)
+    return tl::make_unexpected(idle.error());
   if (program.is_understood()) {
     if (const Status used = check_used(rows, frames, program, files.dialect); !used)
       return tl::make_unexpected(used.error());

@@ -19,20 +19,23 @@ struct ProgramFiles {
   bool from_folder = false;        ///< the output is a folder too
   std::set<std::string> system =
       {};  ///< names of files that belong to the controller and were found in a folder: read, not written
+  std::vector<cam::SourceFile> parameters = {};  ///< MOC.cfg of an ABB backup that a folder is
+  std::string task = {};                         ///< of RAPID, whose modules were taken; empty: of all
 };
 
 /// Whether the inputs are a robot program. Otherwise they are one table of targets (.csv).
 [[nodiscard]] bool is_program(const std::vector<std::string>& inputs, const std::string& format);
 
 /// `inputs`: files, folders (with all they hold of one dialect), or `-`. `format`: the dialect, or empty: by the
-/// endings. Refuses files of several dialects, a folder without programs, the same name twice.
-[[nodiscard]] Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs,
-                                                      const std::string& format);
+/// endings. `task`: of an ABB backup, whose modules alone are taken; empty: those of all. Refuses files of several
+/// dialects, a folder without programs or without that task, the same name twice.
+[[nodiscard]] Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, const std::string& format,
+                                                      const std::string& task = "");
 
 /// What cam::read_program() makes of the files. `frames`: values of tools and frames that they leave open, or empty
 /// (CSV: `name,x_mm,y_mm,z_mm,qw,qx,qy,qz`; frames seen from the robot's base, tools from the flange). Refuses a
-/// program without a single motion or target in any of them, and rows of `frames` that nothing uses, unless their
-/// column `may_be_unused` says yes.
+/// program without a single motion or target in any of them, a backup of several robots of which no task is taken, and
+/// rows of `frames` that nothing uses, unless their column `may_be_unused` says yes.
 [[nodiscard]] Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOptions options,
                                                       const std::string& frames);
 

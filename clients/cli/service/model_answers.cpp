@@ -5,7 +5,13 @@
 namespace trammel::cli {
 
 cam::CellTools tools_of(const CompensatedModel& model) {
-  return {model.parts().physics.tools, model.cell().payloads, model.cell().X_WB};
+  cam::CellTools cell{model.parts().physics.tools, model.cell().payloads, model.cell().X_WB};
+  cell.check_known = [&model](const std::string& tool, const std::string& payload) -> Status {
+    const auto known = known_tool_and_payload(model, tool, payload);
+    if (!known) return tl::make_unexpected(known.error());
+    return {};
+  };
+  return cell;
 }
 
 Result<ToolAndPayload> known_tool_and_payload(const CompensatedModel& model, const std::string& tool,

@@ -1,0 +1,218 @@
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <random>
+
+#include "clients/cam/dialect.h"
+#include "clients/cam/nominal_targets.h"
+#include "server/base/units.h"
+#include "server/robot/cell.h"
+
+// Which of its solutions does a controller take? The oracle has its own kinematics of a UR10 and finds its solutions by
+// descents from many places.
+namespace trammel::cam {
+namespace {
+
+using Joints = Eigen::Matrix<double, 6, 1>;
+
+Eigen::Isometry3d oracle_flange(const Joints& q) {
+  constexpr std::array<double, 6> kD = {.1273, 0, 0, .163941, .1157, .0922}, kA = {0, -.612, -.5723, 0, 0, 0},
+                                  kAlpha = {kPi / 2, 0, 0, kPi / 2, -kPi / 2, 0};
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  for (std::size_t j = 0; j < 6; ++j) {
+    X.rotate(Eigen::AngleAxisd(q(static_cast<Eigen::Index>(j)), Eigen::Vector3d::UnitZ()));
+    X.translate(Eigen::Vector3d(0, 0, kD[j]));
+    X.translate(Eigen::Vector3d(kA[j], 0, 0));
+    X.rotate(Eigen::AngleAxisd(kAlpha[j], Eigen::Vector3d::UnitX()));
+  }
+  return X;
+}
+const Eigen::Isometry3d kTcp(Eigen::Translation3d(0, 0, .1));
+
+Joints off(const Joints& q, const Eigen::Isometry3d& wanted) {
+  const Eigen::Isometry3d X = oracle_flange(q);
+  const Eigen::AngleAxisd turn(wanted.linear() * X.linear().transpose());
+  Joints e;
+  e << wanted.translation() - X.translation(), turn.angle() * turn.axis();
+  return e;
+}
+
+/// All joints within half a turn that bring the flange there.
+std::vector<Joints> oracle_solutions(const Eigen::Isometry3d& wanted, std::mt19937& random) {
+  std::uniform_real_distribution<double> angle(-kPi, kPi);
+  std::vector<Joints> found;
+  for (int start = 0; start < 250; ++start) {
+    Joints q;
+    for (int j = 0; j < 6; ++j) q(j) = angle(random);
+    Joints e = off(q, wanted);
+    for (int step = 0; step < 40 && e.norm() > 1e-11; ++step) {
+      Eigen::Matrix<double, 6, 6> J;
+      for (int j = 0; j < 6; ++j) {
+        Joints more = q;
+        more(j) += 1e-6;
+        J.col(j) = (off(more, wanted) - e) / 1e-6;
+      }
+      Joints way =
+          -(J.transpose() * J + 1e-9 * Eigen::Matrix<double, 6, 6>::Identity()).ldlt().solve(J.transpose() * e);
+      if (way.norm() > 0.5) way *= 0.5 / way.norm();
+      q += way;
+      e = off(q, wanted);
+    }
+    if (e.norm() > 1e-9) continue;
+    for (int j = 0; j < 6; ++j) q(j) = std::remainder(q(j), 2 * kPi);
+    const bool known =
+        std::any_of(found.begin(), found.end(), [&](const Joints& one) { return (one - q).norm() < 1e-4; });
+    if (!known) found.push_back(q);
+  }
+  return found;
+}
+
+Joints turned_to(Joints q, const Joints& near) {
+  for (int j = 0; j < 6; ++j) q(j) += 2 * kPi * std::round((near(j) - q(j)) / (2 * kPi));
+  return q;
+}
+
+std::string joints_text(const Joints& q) {
+  return fmt::format("[{:.9f}, {:.9f}, {:.9f}, {:.9f}, {:.9f}, {:.9f}]", q(0), q(1), q(2), q(3), q(4), q(5));
+}
+std::string pose_of_joints(const Joints& q) {
+  const Eigen::Isometry3d X = oracle_flange(q) * kTcp;
+  const Eigen::AngleAxisd turn(X.linear());
+  const Eigen::Vector3d p = X.translation(), w = turn.angle() * turn.axis();
+  return fmt::format("p[{:.10f}, {:.10f}, {:.10f}, {:.10f}, {:.10f}, {:.10f}]", p(0), p(1), p(2), w(0), w(1), w(2));
+}
+
+NominalTargets ur(const std::string& lines) {
+  static const Chain chain = read_robot(TRAMMEL_SOURCE_DIR "/models/universal-robots_ur10.yaml").value();
+  const std::string text = "def p():\n  set_tcp(p[0, 0, 0.1, 0, 0, 0])\n" + lines + "end\n";
+  const Program program = read_program(Dialect::kUrScript, {{"p.script", text}}, {});
+  EXPECT_TRUE(program.left.empty()) << program.left[0].why;
+  return nominal_targets(program, ArmOfProgram(chain), {{{"tool", Pose(kTcp)}}, {}}, "", "").value();
+}
+/// Of the last target in the text.
+const NominalTarget& last_of(const NominalTargets& nominal) { return nominal.targets.back(); }
+
+/// Where postures meet nothing is nearer than the other: away from a stretched elbow, wrist and shoulder.
+bool is_open(const Joints& q) {
+  const Eigen::Isometry3d X = oracle_flange(q);
+  const Eigen::Vector3d wrist = X.translation() - .0922 * X.linear().col(2);
+  return std::abs(std::sin(q(2))) > .3 && std::abs(std::sin(q(4))) > .3 && wrist.head<2>().norm() > .3;
+}
+Joints drawn(std::mt19937& random) {
+  std::uniform_real_distribution<double> angle(-2.8, 2.8);
+  Joints q;
+  do {
+    for (int j = 0; j < 6; ++j) q(j) = angle(random);
+  } while (!is_open(q));
+  return q;
+}
+Joints with(std::initializer_list<double> values) {
+  Joints q;
+  std::copy(values.begin(), values.end(), q.data());
+  return q;
+}
+const Joints kReady = with({-1.5, -1.3, -1.7, -1.7, 1.57, 0});
+
+TEST(Posture, JointsThatAMotionNamesDecideWhereverTheArmComesFrom) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> near(0, .05);
+  for (int k = 0; k < 40; ++k) {
+    const Joints q = drawn(random);
+    Joints named = q;
+    for (int j = 0; j < 6; ++j) named(j) += near(random);
+    const std::string goal = "  movej(get_inverse_kin(" + pose_of_joints(q) + ", qnear=" + joints_text(named) + "))\n";
+    for (const std::string& before : {std::string(), "  movej(" + joints_text(kReady) + ")\n"}) {
+      const NominalTargets made = ur(before + goal);
+      ASSERT_TRUE(last_of(made).q) << last_of(made).why_not;
+      EXPECT_LT((*last_of(made).q - q).norm(), 1e-6) << joints_text(q);
+    }
+  }
+}
+
+TEST(Posture, JointsThatAVariableNamesDecideToo) {
+  const Joints q = with({0.89955, -1.91986, 1.74533, -1.39626, -1.57080, -0.67124});
+  const NominalTargets made = ur("  global W_p=" + pose_of_joints(q) + "\n  global W_q=" + joints_text(q) +
+                                 "\n  movej(get_inverse_kin(W_p, W_q), a=1.4)\n");
+  ASSERT_TRUE(made.targets[0].q) << made.targets[0].why_not;
+  EXPECT_LT((*made.targets[0].q - q).norm(), 1e-6);
+}
+
+TEST(Posture, AMotionOfTheAxesTakesTheSolutionNextToTheJointsBefore) {
+  std::mt19937 random(7);
+  int decided = 0;
+  for (int k = 0; k < 25; ++k) {
+    const Joints from = drawn(random), somewhere = drawn(random);
+    std::vector<std::pair<double, Joints>> all;
+    for (const Joints& q : oracle_solutions(oracle_flange(somewhere), random))
+      all.emplace_back((turned_to(q, from) - from).norm(), turned_to(q, from));
+    std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    ASSERT_GE(all.size(), 2u);
+    if (all[1].first - all[0].first < .05 * all[0].first) continue;
+    ++decided;
+    const NominalTargets made = ur("  movej(" + joints_text(from) + ")\n  movej(" + pose_of_joints(somewhere) + ")\n");
+    const NominalTarget& last = last_of(made);
+    ASSERT_TRUE(last.q) << last.why_not;
+    EXPECT_LT((*last.q - all[0].second).norm(), 1e-6) << joints_text(from) << " to " << joints_text(somewhere);
+  }
+  EXPECT_GT(decided, 15);
+}
+
+TEST(Posture, WholeTurnsAreTakenOffThatTheLimitsDoNotNeed) {
+  const Joints from = with({0.3, -1.2, -1.6, -1.9, 1.57, 0});
+  const NominalTargets made = ur("  movej(" + joints_text(from) +
+                                 ")\n  movej(p[-0.739592, -0.225787, 0.083127, -2.5469731, 1.8226580, -0.0123047])\n");
+  ASSERT_TRUE(last_of(made).q) << last_of(made).why_not;
+  EXPECT_LT((*last_of(made).q - Eigen::VectorXd(from)).cwiseAbs().maxCoeff(), kPi);
+}
+
+TEST(Posture, ALineKeepsThePostureThatItBeginsIn) {
+  std::mt19937 random(13);
+  std::uniform_real_distribution<double> step(-.12, .12);
+  for (int k = 0; k < 30; ++k) {
+    const Joints from = drawn(random);
+    Joints to = from;
+    for (int j = 0; j < 6; ++j) to(j) += step(random);
+    const NominalTargets made = ur("  movej(" + joints_text(from) + ")\n  movel(" + pose_of_joints(to) + ")\n");
+    ASSERT_TRUE(last_of(made).q) << last_of(made).why_not;
+    EXPECT_LT((*last_of(made).q - to).norm(), 1e-6);
+  }
+}
+
+TEST(Posture, WithoutJointsBeforeATargetIsLeftWithTheReason) {
+  const std::string goal = "  movej(" + pose_of_joints(kReady) + ")\n";
+  const std::string ready = "  movej(" + joints_text(kReady) + ")\n";
+  EXPECT_NE(last_of(ur(goal)).why_not.find("the program does not say these"), std::string::npos);
+  EXPECT_TRUE(last_of(ur(ready + goal)).q);
+  // At the head of a loop the arm comes from its end, too; joints that are there again and again are one posture.
+  EXPECT_FALSE(last_of(ur("  while i < 2:\n" + goal + "  end\n")).q);
+  EXPECT_TRUE(last_of(ur(ready + "  while i < 2:\n" + goal + "  end\n")).q);
+}
+
+TEST(Posture, APointThatIsReachedInTwoPosturesIsLeft) {
+  const Joints other = with({0.89955, -1.91986, 1.74533, -1.39626, -1.57080, -0.67124});
+  const std::string lines = "  hole = " + pose_of_joints(other) +
+                            "\n  movej(get_inverse_kin(hole, qnear=" + joints_text(other) + "))\n  movej(" +
+                            joints_text(kReady) + ")\n  movej(hole)\n";
+  const NominalTargets made = ur(lines);
+  ASSERT_EQ(made.targets.size(), 2u);
+  EXPECT_EQ(made.targets[0].why_not, "motions come to it in different postures");
+}
+
+TEST(Posture, TwoPosturesThatAreEquallyNearAreLeft) {
+  // Halfway between two solutions of one pose neither is nearer.
+  std::mt19937 random(17);
+  const Joints q = with({0.6, -1.4, 1.3, -1.1, 1.2, 0.4});
+  Joints nearest = Joints::Constant(100);
+  for (const Joints& one : oracle_solutions(oracle_flange(q), random)) {
+    const Joints other = turned_to(one, q);
+    if ((other - q).norm() > 1e-3 && (other - q).norm() < (nearest - q).norm()) nearest = other;
+  }
+  const NominalTargets made =
+      ur("  movej(" + joints_text((q + nearest) / 2) + ")\n  movej(" + pose_of_joints(q) + ")\n");
+  EXPECT_NE(last_of(made).why_not.find("equally near"), std::string::npos) << last_of(made).why_not;
+}
+
+}  // namespace
+}  // namespace trammel::cam
