@@ -147,10 +147,13 @@ class Gate final : public rtps::ChainingTransport {
     const LostLeases::Time now = LostLeases::now();
     leases_.awake(now);
     const std::vector<std::uint64_t> silent = leases_.silent_sockets(now);
-    if (silent.empty()) return below->send(buffer, size, first, last, limit);
+    const bool strangers = guard_ && guard_->knows_strangers();
+    if (silent.empty() && !strangers) return below->send(buffer, size, first, last, limit);
     rtps::LocatorList rest;
     for (; *first != *last; ++*first) {
-      if (std::find(silent.begin(), silent.end(), socket_of(**first)) == silent.end()) rest.push_back(**first);
+      const std::uint64_t socket = socket_of(**first);
+      if (std::find(silent.begin(), silent.end(), socket) != silent.end()) continue;
+      if (!strangers || is_host(socket) || guard_->lets_out(socket)) rest.push_back(**first);
     }
     rtps::Locators begin(rest.begin()), end(rest.end());
     return rest.empty() || below->send(buffer, size, &begin, &end, limit);
@@ -176,6 +179,10 @@ class Gate final : public rtps::ChainingTransport {
     std::uint64_t socket = there.port;
     for (std::size_t i = 12; i < 16; ++i) socket = socket << 8 | address[i];
     return socket;
+  }
+
+  [[nodiscard]] bool is_host(std::uint64_t socket) const {
+    return std::find(hosts_.begin(), hosts_.end(), socket) != hosts_.end();
   }
 
   [[nodiscard]] bool is_own(Bytes message) const {
@@ -221,6 +228,7 @@ class Gate final : public rtps::ChainingTransport {
   const std::optional<std::uint32_t> domain_;
   const std::shared_ptr<HeardOfItself> heard_;
   const std::unique_ptr<Guard> guard_;
+  std::vector<std::uint64_t> hosts_;  // their sockets
   HeartbeatPace pace_;
   LostLeases leases_{kLease};
   std::atomic<bool> knows_itself_{false};
@@ -232,31 +240,35 @@ class Gate final : public rtps::ChainingTransport {
 
 class GateDescriptor final : public rtps::ChainingTransportDescriptor {
  public:
-  GateDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> below, std::optional<std::uint32_t> of,
-                 std::shared_ptr<HeardOfItself> counted, std::shared_ptr<DropCounts> dropped_counts,
+  GateDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> below, GateOptions of, bool all,
                  std::vector<Relay> believed)
       : ChainingTransportDescriptor(std::move(below)),
-        domain(of),
-        heard(std::move(counted)),
-        dropped(std::move(dropped_counts)),
+        options(std::move(of)),
+        all_domains(all),
         relays(std::move(believed)) {}
 
   rtps::TransportInterface* create_transport() const override { return new Gate(*this); }
+  /// Of what is sent. The transport below receives what it is configured for itself.
+  std::uint32_t max_message_size() const override {
+    return std::min(options.largest_sent, ChainingTransportDescriptor::max_message_size());
+  }
 
-  std::optional<std::uint32_t> domain;  // none: all domains
-  std::shared_ptr<HeardOfItself> heard;
-  std::shared_ptr<DropCounts> dropped;  // null: no guard
+  GateOptions options;
+  bool all_domains;
   std::vector<Relay> relays;
 };
 
 Gate::Gate(const GateDescriptor& descriptor)
     : ChainingTransport(descriptor),
       configuration_(std::make_unique<GateDescriptor>(descriptor)),
-      domain_(descriptor.domain),
-      heard_(descriptor.heard),
-      guard_(descriptor.dropped ? std::make_unique<Guard>(static_cast<std::uint32_t>(kMaxTextSample),
-                                                          descriptor.dropped, descriptor.relays)
-                                : nullptr) {}
+      domain_(descriptor.all_domains ? std::nullopt : std::optional(descriptor.options.domain)),
+      heard_(descriptor.options.heard),
+      guard_(descriptor.options.dropped
+                 ? std::make_unique<Guard>(static_cast<std::uint32_t>(kMaxTextSample), descriptor.options.dropped,
+                                           descriptor.relays, descriptor.options.secured)
+                 : nullptr) {
+  for (const Locator_t& host : descriptor.options.hosts) hosts_.push_back(socket_of(host));
+}
 
 rtps::TransportDescriptorInterface* Gate::get_configuration() { return configuration_.get(); }
 
@@ -275,16 +287,15 @@ bool is_announcement(std::span<const unsigned char> message) {
 }
 
 std::shared_ptr<rtps::TransportDescriptorInterface> with_domain_gate(
-    std::shared_ptr<rtps::TransportDescriptorInterface> below, std::uint32_t domain,
-    std::shared_ptr<HeardOfItself> heard, std::shared_ptr<DropCounts> dropped) {
-  return std::make_shared<GateDescriptor>(std::move(below), domain, std::move(heard), std::move(dropped),
-                                          std::vector<Relay>());
+    std::shared_ptr<rtps::TransportDescriptorInterface> below, const GateOptions& options) {
+  return std::make_shared<GateDescriptor>(std::move(below), options, false, std::vector<Relay>());
 }
 
 std::shared_ptr<rtps::TransportDescriptorInterface> with_relay_guard(
     std::shared_ptr<rtps::TransportDescriptorInterface> below, std::vector<Relay> relays) {
-  return std::make_shared<GateDescriptor>(std::move(below), std::nullopt, nullptr, std::make_shared<DropCounts>(),
-                                          std::move(relays));
+  GateOptions options;
+  options.dropped = std::make_shared<DropCounts>();
+  return std::make_shared<GateDescriptor>(std::move(below), options, true, std::move(relays));
 }
 
 }  // namespace trammel::wire

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <fastdds/rtps/common/Locator.h>
 #include <fastdds/rtps/transport/TransportDescriptorInterface.h>
 
 #include <atomic>
@@ -40,11 +41,19 @@ struct HeardOfItself {
   std::atomic<std::uint32_t> first_lost_of{0};
 };
 
+struct GateOptions {
+  std::uint32_t domain = 0;
+  std::shared_ptr<HeardOfItself> heard = {};  ///< may be null
+  std::shared_ptr<DropCounts> dropped = {};   ///< null: there is no guard. For tests that show what it is for
+  std::uint32_t largest_sent = UINT32_MAX;    ///< bytes of a datagram; others may send what `below` takes
+  bool secured = false;                       ///< participants prove who they are
+  /// Where others are looked for: they are sent what they are sent, whoever else names them.
+  std::vector<eprosima::fastrtps::rtps::Locator_t> hosts = {};
+};
+
 /// The transport `below` with the gate in front, and before it the guard (guard/guard.h), which counts in `dropped`.
-/// `heard` may be null. Without `dropped` there is no guard: for tests that show what it is for.
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> with_domain_gate(
-    std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> below, std::uint32_t domain,
-    std::shared_ptr<HeardOfItself> heard, std::shared_ptr<DropCounts> dropped);
+    std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> below, const GateOptions& options);
 
 /// `below` with a guard in front that lets `relays` announce others, of any domain.
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> with_relay_guard(

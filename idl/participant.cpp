@@ -15,6 +15,7 @@
 #include <sstream>
 #include <utility>
 
+#include "idl/library_clock.h"
 #include "idl/limits.h"
 #include "idl/quiet_library.h"
 #include "server/base/host_port.h"
@@ -49,6 +50,7 @@ class LibraryErrors final : public dds::LogConsumer {
 void set_up_process() {
   static std::once_flag once;
   std::call_once(once, [] {
+    start_library_clock();
     // Both would silently change how participants find each other.
     unsetenv("ROS_DISCOVERY_SERVER");
     unsetenv("FASTRTPS_DEFAULT_PROFILES_FILE");

@@ -16,8 +16,9 @@ template <typename State>
 class StateReader final : private dds::DataReaderListener {
  public:
   using Sample = typename State::Type::type;
-  /// The sample, the participant that wrote it and when (Unix time, s); no sample: the participant has left.
-  using Listener = std::function<void(const Sample*, const std::string& participant, double written_unix_s)>;
+  /// The sample, the participant that wrote it and when (s, by the writer's clock for what it sends: library_clock.h);
+  /// no sample: the participant has left.
+  using Listener = std::function<void(const Sample*, const std::string& participant, double written_s)>;
 
   [[nodiscard]] static Result<std::unique_ptr<StateReader>> open(dds::DomainParticipant& participant,
                                                                  dds::Subscriber& subscriber,

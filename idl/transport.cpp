@@ -15,7 +15,7 @@ namespace rtps = eprosima::fastrtps::rtps;
 
 // Bytes. On a line a datagram is one frame of an Ethernet: of a larger one a lost frame takes all others with it, so
 // that a line that loses every twentieth lets hardly any of 64 kB through. The handshake of DDS-Security is not sent in
-// parts: it holds certificate and permissions.
+// parts: it holds certificate and permissions. Others may send larger ones.
 constexpr std::uint32_t kDatagramOfALine = 1400;
 constexpr std::uint32_t kSecuredDatagramOfALine = 16384;
 constexpr int kReplicaDepth = 16;
@@ -79,20 +79,19 @@ void set_reader_times(dds::DataReaderQos& qos) {
 Result<ParticipantPtr> make_participant(const ParticipantOptions& options, dds::DomainParticipantListener* discovery) {
   const auto udp = udp_on(options.address);
   if (!udp) return tl::make_unexpected(udp.error());
+  GateOptions gate{options.domain, options.heard_of_itself, options.dropped};
+  gate.secured = options.security.has_value();
+  for (const std::uint16_t port : options.peer_ports) gate.hosts.push_back(locator(options.address, port));
+  for (const HostPort& peer : options.peers) gate.hosts.push_back(locator(peer.address, peer.port));
+  if (options.heard_of_itself) gate.hosts.push_back(locator(options.address, options.listen_port));
   if (!options.address.starts_with("127."))
-    (*udp)->maxMessageSize = options.security ? kSecuredDatagramOfALine : kDatagramOfALine;
+    gate.largest_sent = options.security ? kSecuredDatagramOfALine : kDatagramOfALine;
 
-  dds::DomainParticipantQos qos =
-      participant_qos(with_domain_gate(*udp, options.domain, options.heard_of_itself, options.dropped), options.address,
-                      options.listen_port);
+  dds::DomainParticipantQos qos = participant_qos(with_domain_gate(*udp, gate), options.address, options.listen_port);
   qos.name(options.name);
   set_user_data(qos, domain_mark(options.domain));
-  auto& builtin = qos.wire_protocol().builtin;
-  for (const std::uint16_t port : options.peer_ports)
-    builtin.initialPeersList.push_back(locator(options.address, port));
-  for (const HostPort& peer : options.peers) builtin.initialPeersList.push_back(locator(peer.address, peer.port));
+  for (const auto& host : gate.hosts) qos.wire_protocol().builtin.initialPeersList.push_back(host);
   if (options.security) set_security(qos.properties(), *options.security);
-  if (options.heard_of_itself) builtin.initialPeersList.push_back(locator(options.address, options.listen_port));
 
   dds::DomainParticipant* participant = dds::DomainParticipantFactory::get_instance()->create_participant(
       options.domain, qos, discovery, dds::StatusMask::none());

@@ -10,10 +10,6 @@ namespace {
 
 constexpr std::size_t kJobsRemembered = 1000;
 
-double unix_time_s() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-
 }  // namespace
 
 Result<std::unique_ptr<ServerWatch>> ServerWatch::open(wire::dds::DomainParticipant& participant,
@@ -22,8 +18,8 @@ Result<std::unique_ptr<ServerWatch>> ServerWatch::open(wire::dds::DomainParticip
   ServerWatch* self = watch.get();
   auto status = wire::StateReader<wire::ServiceStatusTopic>::open(
       participant, subscriber, wire::state_reader_qos(),
-      [self](const wire::ServiceStatus* sample, const std::string& writer, double) {
-        self->on_status(sample, writer);
+      [self](const wire::ServiceStatus* sample, const std::string& writer, double written) {
+        self->on_status(sample, writer, written);
       });
   if (!status) return tl::make_unexpected(status.error());
   watch->status_reader_ = std::move(*status);
@@ -186,6 +182,15 @@ bool ServerWatch::knows_all_models() const {
   return true;
 }
 
+double ServerWatch::age_s(const std::string& participant, const KnownModel& known) const {
+  for (const auto& [id, server] : servers_) {
+    if (server.participant != participant) continue;
+    const std::chrono::duration<double> since_status = Clock::now() - server.heard;
+    return std::max(0.0, server.written_s + since_status.count() - known.written_s);
+  }
+  return 0;
+}
+
 std::vector<wire::ModelInfo> ServerWatch::models_in_force() {
   MutexLock lock(mutex_);
   changed_.wait_until(lock, Clock::now() + wire::kStatusPeriod,
@@ -196,7 +201,7 @@ std::vector<wire::ModelInfo> ServerWatch::models_in_force() {
   std::map<std::string, std::pair<std::uint64_t, wire::ModelInfo>> newest;
   for (const auto& [key, known] : models_) {
     wire::ModelInfo model = known.model;
-    const double since_s = std::max(0.0, unix_time_s() - known.written_unix_s);
+    const double since_s = age_s(key.first, known);
     model.data_age_s(model.data_age_s() + since_s);
     model.training_age_s(model.training_age_s() + since_s);
     const std::pair found{epoch_of[key.first], model};
@@ -238,11 +243,11 @@ void ServerWatch::on_old_status(const contract_1::ServiceStatus* status, const s
   changed_.notify_all();
 }
 
-void ServerWatch::on_status(const wire::ServiceStatus* status, const std::string& participant) {
+void ServerWatch::on_status(const wire::ServiceStatus* status, const std::string& participant, double written_s) {
   {
     const MutexLock lock(mutex_);
     if (status != nullptr) {
-      servers_[status->server().to_string()] = {participant, *status, Clock::now()};
+      servers_[status->server().to_string()] = {participant, *status, Clock::now(), written_s};
     } else {
       std::erase_if(servers_, [&](const auto& entry) { return entry.second.participant == participant; });
     }
@@ -262,11 +267,11 @@ void ServerWatch::on_replica(const wire::ReplicaStatus* status, const std::strin
   changed_.notify_all();
 }
 
-void ServerWatch::on_model(const wire::ModelStatus* status, const std::string& participant, double written_unix_s) {
+void ServerWatch::on_model(const wire::ModelStatus* status, const std::string& participant, double written_s) {
   {
     const MutexLock lock(mutex_);
     if (status != nullptr) {
-      models_[{participant, status->cell().to_string()}] = {status->model(), written_unix_s};
+      models_[{participant, status->cell().to_string()}] = {status->model(), written_s};
     } else {
       std::erase_if(models_, [&](const auto& entry) { return entry.first.first == participant; });
     }

@@ -24,6 +24,7 @@ struct KnownServer {
   std::string participant;
   wire::ServiceStatus status;
   Clock::time_point heard;
+  double written_s = 0;  ///< when the status was written, by the server's clock for what it writes
   std::optional<wire::ReplicaStatus> replica = {};  ///< empty: it is no replica, or this is not allowed to be read
 
   [[nodiscard]] std::string id() const { return status.server().to_string(); }
@@ -35,10 +36,10 @@ struct OtherServer {
   std::uint32_t contract = 0;
 };
 
-/// A model in force, and when a server described it so.
+/// A model in force, and when a server described it so, by its clock for what it writes.
 struct KnownModel {
   wire::ModelInfo model;
-  double written_unix_s = 0;
+  double written_s = 0;
 };
 
 /// The servers that are there, and what they published on the state topics. Thread-safe.
@@ -88,8 +89,8 @@ class ServerWatch {
   /// Waits until `found`, and gives up at `deadline` or when it is in vain.
   template <typename Found>
   void wait_for_first(MutexLock& lock, Clock::time_point deadline, const Found& found) TRAMMEL_REQUIRES(mutex_);
-  void on_status(const wire::ServiceStatus* status, const std::string& participant);
-  void on_model(const wire::ModelStatus* status, const std::string& participant, double written_unix_s);
+  void on_status(const wire::ServiceStatus* status, const std::string& participant, double written_s);
+  void on_model(const wire::ModelStatus* status, const std::string& participant, double written_s);
   void on_progress(const wire::TrainingProgress* progress);
   void on_replica(const wire::ReplicaStatus* status, const std::string& participant);
   [[nodiscard]] const KnownServer* choose(const std::string& cell, const std::string& avoid, bool of_writer,
@@ -99,6 +100,8 @@ class ServerWatch {
   [[nodiscard]] bool is_settled(const KnownServer& chosen, const std::string& cell) const TRAMMEL_REQUIRES(mutex_);
   /// Whether the part of every server that has one is known.
   [[nodiscard]] bool knows_all_parts() const TRAMMEL_REQUIRES(mutex_);
+  /// How long ago the model was described so, by its server's clock alone: others may differ from it, or be set.
+  [[nodiscard]] double age_s(const std::string& participant, const KnownModel& known) const TRAMMEL_REQUIRES(mutex_);
   /// Whether the models of every server are as many as it reports.
   [[nodiscard]] bool knows_all_models() const TRAMMEL_REQUIRES(mutex_);
 

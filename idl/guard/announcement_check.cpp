@@ -136,13 +136,24 @@ bool is_locator(std::uint16_t id) {
 bool is_of(Bytes guid, Bytes source) { return std::equal(source.begin(), source.end(), guid.begin()); }
 
 /// False when the lease is negative.
-bool cut_lease(const Parameter& lease, bool little_endian, EditedMessage& message, std::uint32_t& left) {
-  const std::uint32_t seconds = Reader(lease.value, little_endian).u32().value_or(0);
+bool cut_lease(const Parameter& lease, EditedMessage& message, Reachable& reachable) {
+  const std::uint32_t seconds = Reader(lease.value, reachable.little_endian).u32().value_or(0);
   constexpr std::uint32_t kForever = 0x7fffffff;
   if (seconds > kForever) return false;
-  left = std::min(seconds, kLongestLeaseSeconds);
-  if (left != seconds) message.put(lease.value.first(4), left, little_endian);
+  reachable.lease = lease.value;
+  reachable.lease_seconds = std::min(seconds, kLongestLeaseSeconds);
+  if (reachable.lease_seconds != seconds)
+    message.put(lease.value.first(4), reachable.lease_seconds, reachable.little_endian);
   return true;
+}
+
+/// False when there are too many of them. `locator` fits().
+bool take_locator(Reader locator, Reachable& reachable) {
+  locator.take(4);  // the kind: of another one than UDP over IPv4 nothing is sent
+  const std::uint64_t port = locator.u32().value_or(0);
+  constexpr std::size_t kBeforeIpv4 = 12;
+  locator.take(kBeforeIpv4);
+  return reachable.sockets.add(port << 32 | locator.entity().value_or(0));
 }
 
 /// A reader whose partition has wildcards would get every client's replies. `list` fits().
@@ -217,12 +228,12 @@ Fault check_inline_qos(Reader& rest, Bytes source, bool names_source, bool& says
   }
 }
 
-Fault check_announcement(Bytes payload, Bytes source, EditedMessage& message, std::uint32_t& lease_seconds) {
-  lease_seconds = kUsualLeaseSeconds;
+Fault check_announcement(Bytes payload, Bytes source, EditedMessage& message, Reachable& reachable) {
   constexpr unsigned char kListBigEndian = 0x02, kListLittleEndian = 0x03;
   if (payload.size() < 4 || payload[0] != 0) return Dropped::kParameters;
   if (payload[1] != kListBigEndian && payload[1] != kListLittleEndian) return Dropped::kParameters;
   const bool little_endian = payload[1] == kListLittleEndian;
+  reachable.little_endian = little_endian;
   Reader list(payload.subspan(4), little_endian);
   int locators = 0;
   while (true) {
@@ -237,11 +248,12 @@ Fault check_announcement(Bytes payload, Bytes source, EditedMessage& message, st
     }
     if (!fits(parameter.id, Reader(parameter.value, little_endian))) return Dropped::kParameters;
     if (is_locator(parameter.id) && ++locators > kMostLocators) return Dropped::kParameters;
+    if (is_locator(parameter.id) && !take_locator(Reader(parameter.value, little_endian), reachable))
+      message.put(here.first(2), std::uint16_t{kPadding}, little_endian);
     const bool names = parameter.id == kParticipantGuid || parameter.id == kEndpointGuid || parameter.id == kKeyHash;
     if (names && !is_of(parameter.value, source)) return Dropped::kSource;
     if (parameter.id == kPartition && has_wildcard(Reader(parameter.value, little_endian))) return Dropped::kWildcard;
-    if (parameter.id == kLease && !cut_lease(parameter, little_endian, message, lease_seconds))
-      return Dropped::kParameters;
+    if (parameter.id == kLease && !cut_lease(parameter, message, reachable)) return Dropped::kParameters;
   }
 }
 

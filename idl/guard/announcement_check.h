@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 #include "idl/guard/dropped.h"
 #include "idl/guard/edited_message.h"
@@ -13,18 +15,43 @@ namespace trammel::wire {
 /// must be of `source` (empty: of anybody).
 [[nodiscard]] std::optional<Dropped> check_inline_qos(Reader& rest, Bytes source, bool names_source, bool& says_status);
 
+inline constexpr std::uint32_t kLongestLeaseSeconds = 120;
+inline constexpr std::uint32_t kUsualLeaseSeconds = 100;  // RTPS 2.2, table 9.12
+
+/// The sockets (address and port) that an announcement names.
+class NamedSockets {
+ public:
+  static constexpr std::size_t kMost = 16;
+  /// False: there is no room.
+  bool add(std::uint64_t socket) {
+    if (count_ == kMost) return false;
+    sockets_[count_++] = socket;
+    return true;
+  }
+  [[nodiscard]] std::span<const std::uint64_t> all() const { return {sockets_.data(), count_}; }
+
+ private:
+  std::array<std::uint64_t, kMost> sockets_{};
+  std::size_t count_ = 0;
+};
+
+/// What an announcement says of when and where its sender can be reached.
+struct Reachable {
+  std::uint32_t lease_seconds = kUsualLeaseSeconds;  ///< kLongestLeaseSeconds at most
+  Bytes lease{};                                     ///< where it stands; empty: none is said
+  bool little_endian = true;
+  NamedSockets sockets{};
+};
+
 /// The payload of a participant's, writer's or reader's announcement by `source`: each length and count within its
 /// parameter, GUIDs of `source` (empty: of anybody). Parameters that only this library reads, that nobody here needs
-/// and whose parsers trust what they read (type objects, content filters) are blanked in `message`. Leases are cut to
-/// kLongestLeaseSeconds; `lease_seconds` is the one that is left, kUsualLeaseSeconds where none is said.
+/// and whose parsers trust what they read (type objects, content filters) are blanked in `message`, and so are locators
+/// beyond the first NamedSockets::kMost. Leases are cut to kLongestLeaseSeconds.
 [[nodiscard]] std::optional<Dropped> check_announcement(Bytes payload, Bytes source, EditedMessage& message,
-                                                        std::uint32_t& lease_seconds);
+                                                        Reachable& reachable);
 
 /// The payload of a message of the authentication handshake, which comes before anybody is known. It is of `source`,
 /// and so is the announcement within: the library compares that with the certificate, and not with who speaks.
 [[nodiscard]] std::optional<Dropped> check_handshake(Bytes payload, Bytes source);
-
-inline constexpr std::uint32_t kLongestLeaseSeconds = 120;
-inline constexpr std::uint32_t kUsualLeaseSeconds = 100;  // RTPS 2.2, table 9.12
 
 }  // namespace trammel::wire

@@ -22,15 +22,17 @@ constexpr std::array<const char*, kDroppedReasons> kNames = {"no RTPS message", 
 
 const char* name_of(Dropped reason) { return kNames[static_cast<std::size_t>(reason)]; }
 
-Guard::Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts, std::vector<Relay> relays)
+Guard::Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts, std::vector<Relay> relays, bool secured)
     : largest_sample_(largest_sample),
       counts_(counts ? std::move(counts) : std::make_shared<DropCounts>()),
-      relays_(std::move(relays)) {}
+      relays_(std::move(relays)),
+      secured_(secured) {}
 
 std::optional<Bytes> Guard::check(Bytes message, std::uint64_t socket, Time now) {
   EditedMessage edited(message);
   const bool relayed = is_of_relay(message, socket);
-  if (const auto dropped = MessageCheck({largest_sample_, socket, now, relayed}, memory_, message, edited).run()) {
+  if (const auto dropped =
+          MessageCheck({largest_sample_, socket, now, relayed, secured_}, memory_, message, edited).run()) {
     counts_->add(*dropped);
     return std::nullopt;
   }
@@ -46,8 +48,19 @@ bool Guard::is_of_relay(Bytes message, std::uint64_t socket) const {
   });
 }
 
+bool Guard::lets_out(std::uint64_t socket, Time now) {
+  const MutexLock lock(memory_.mutex);
+  const bool may_leave = memory_.participants.lets_out(socket, now);
+  memory_.note_strangers();
+  return may_leave;
+}
+
 void Guard::sent(Bytes message) {
   if (message.size() < kHeader) return;
+  if (!knows_own_.exchange(true)) {
+    const MutexLock lock(memory_.mutex);
+    std::copy_n(message.begin() + kPrefixAt, kPrefix, memory_.own.begin());
+  }
   Bytes rest = message.subspan(kHeader), to{};
   while (const auto submessage = next_submessage(rest)) {
     if (submessage->id == kInfoDestination && submessage->body.size() >= kPrefix) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -23,8 +24,9 @@ class Guard {
 
   /// `largest_sample`: bytes that a sample of any topic may have.
   /// `relays` may announce others.
+  /// `secured`: participants prove who they are, so what is said without proof sends none of them away.
   explicit Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts = nullptr,
-                 std::vector<Relay> relays = {});
+                 std::vector<Relay> relays = {}, bool secured = false);
 
   /// What of a message that was received from `socket` (address and port) the library may see: all of it, as a rule.
   /// Empty: nothing. Valid until the calling thread's next call.
@@ -32,6 +34,10 @@ class Guard {
                                            Time now = std::chrono::steady_clock::now());
   /// A message of our own that leaves.
   void sent(Bytes message);
+  /// Whether lets_out() may be false of any socket.
+  [[nodiscard]] bool knows_strangers() const { return memory_.knows_strangers; }
+  /// Whether a datagram may leave for that socket; one that only strangers name gets a few.
+  [[nodiscard]] bool lets_out(std::uint64_t socket, Time now = std::chrono::steady_clock::now());
 
   [[nodiscard]] const DropCounts& counts() const { return *counts_; }
 
@@ -42,6 +48,8 @@ class Guard {
   const std::uint32_t largest_sample_;
   const std::shared_ptr<DropCounts> counts_;
   const std::vector<Relay> relays_;
+  const bool secured_;
+  std::atomic<bool> knows_own_{false};
   GuardMemory memory_;
 };
 

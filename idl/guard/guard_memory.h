@@ -1,5 +1,9 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <atomic>
+
 #include "idl/guard/fragment_watch.h"
 #include "idl/guard/participant_watch.h"
 #include "idl/guard/sequence_watch.h"
@@ -14,6 +18,14 @@ struct GuardMemory {
   UnfinishedSamples unfinished TRAMMEL_GUARDED_BY(mutex);
   SentSamples sent TRAMMEL_GUARDED_BY(mutex);
   ParticipantWatch participants TRAMMEL_GUARDED_BY(mutex);
+  std::array<unsigned char, kPrefix> own TRAMMEL_GUARDED_BY(mutex) = {};  // prefix; zeros: nothing was sent yet
+  std::atomic<bool> knows_strangers{false};                               // among `participants`
+
+  [[nodiscard]] bool is_own(Bytes prefix) const TRAMMEL_REQUIRES(mutex) {
+    return std::equal(own.begin(), own.end(), prefix.begin());
+  }
+  /// After a change of `participants`.
+  void note_strangers() TRAMMEL_REQUIRES(mutex) { knows_strangers = participants.knows_strangers(); }
 };
 
 }  // namespace trammel::wire

@@ -19,6 +19,7 @@ constexpr std::uint32_t kMostBits = 256;
 constexpr std::uint32_t kMostHistory = 1u << 24;  // samples that a HEARTBEAT may offer
 constexpr std::size_t kStatisticsBody = 56;       // a locator, a time, a sequence; as this library lays it out
 constexpr std::size_t kSmallestFragment = 64;     // the library keeps a list in the first octets of each
+constexpr std::size_t kGapBody = 28;
 
 bool is_announcement_writer(std::uint32_t writer) {
   return writer == kAnnouncer || writer == kPublications || writer == kSubscriptions || writer == kSecureAnnouncer ||
@@ -116,15 +117,17 @@ std::optional<Dropped> MessageCheck::check_submessage(const Submessage& submessa
     case kInfoTimestamp:
       return (submessage.flags & kInlineQos) != 0 ? Fault() : at_least(8);
     case kInfoDestination:
-      return at_least(kPrefix);
+      return check_destination(submessage);
     case kInfoSource:
       return Dropped::kSource;
     case kStatistics:
       return check_statistics(submessage, behind);
+    case kSecureRtpsPrefix:
+      signed_ = true;
+      return check_secured(submessage, behind);
     case kSecureBody:
     case kSecurePrefix:
     case kSecurePostfix:
-    case kSecureRtpsPrefix:
     case kSecureRtpsPostfix:
       return check_secured(submessage, behind);
     default:
@@ -149,15 +152,20 @@ std::optional<Dropped> MessageCheck::check_data(const Submessage& submessage) {
   }
   const bool payload = (submessage.flags & kPayload) != 0, key = (submessage.flags & kKey) != 0;
   if (payload && key) return Dropped::kLength;
+  if (is_unproven(head->writer) && (!payload || says_status)) {
+    ignore_end(head->writer, submessage, *number);
+    return {};
+  }
   if (!payload && head->writer == kAnnouncer && !received_.relayed) {
     const MutexLock lock(memory_.mutex);
     memory_.participants.left(source_);
+    memory_.note_strangers();
   }
   if (!payload && !key) return says_status ? Fault() : Fault(Dropped::kLength);
   if (after.rest().size() < 4) return Dropped::kLength;
   if (!payload) return {};
   const bool handshake = head->writer == kHandshake || head->reader == kHandshakeReader;
-  return handshake ? check_handshake(after.rest(), source_) : check_announced(head->writer, after.rest());
+  return handshake ? check_handshake(after.rest(), source_) : check_announced(submessage, head->writer, after.rest());
 }
 
 /// The writer is reliable: what never arrives is asked for again for ever, and all behind it waits. So what may not
@@ -165,7 +173,6 @@ std::optional<Dropped> MessageCheck::check_data(const Submessage& submessage) {
 std::optional<Dropped> MessageCheck::check_relayed_data(const Submessage& submessage) {
   const Fault fault = check_data(submessage);
   if (!fault) return {};
-  constexpr std::size_t kGapBody = 28;
   Reader reader(submessage.body, submessage.little_endian());
   if (!reader.take(4) || !take_head(reader) || submessage.body.size() < kGapBody) return fault;
   const auto number = reader.sequence_number();
@@ -184,15 +191,53 @@ void MessageCheck::make_gap(const Submessage& data, std::int64_t number) {
   edited_.put(data.body.subspan(24, 4), std::uint32_t{0}, little_endian);
 }
 
-std::optional<Dropped> MessageCheck::check_announced(std::uint32_t writer, Bytes payload) {
-  std::uint32_t lease_seconds = 0;
+/// Where participants prove who they are: whether a writer of announcements is one that anybody can speak for.
+bool MessageCheck::is_unproven(std::uint32_t writer) const {
+  return received_.secured && !signed_ && (writer == kAnnouncer || writer == kPublications || writer == kSubscriptions);
+}
+
+/// Said without proof, that a participant has gone, or one of its endpoints: its lease decides. Writers of endpoints'
+/// announcements are reliable, so of them the number is skipped.
+void MessageCheck::ignore_end(std::uint32_t writer, const Submessage& data, std::int64_t number) {
+  if (writer != kAnnouncer && data.body.size() >= kGapBody) return make_gap(data, number);
+  blank(data);
+}
+
+void MessageCheck::blank(const Submessage& submessage) {
+  edited_.put(message_.subspan(static_cast<std::size_t>(submessage.body.data() - message_.data()) - 4, 1),
+              std::array<unsigned char, 1>{kPad});
+}
+
+/// Who names us has heard us.
+std::optional<Dropped> MessageCheck::check_destination(const Submessage& submessage) {
+  if (submessage.body.size() < kPrefix) return Dropped::kLength;
+  if (!memory_.knows_strangers) return {};
+  const MutexLock lock(memory_.mutex);
+  if (memory_.is_own(submessage.body.first(kPrefix))) memory_.participants.spoke(source_, received_.now);
+  memory_.note_strangers();
+  return {};
+}
+
+std::optional<Dropped> MessageCheck::check_announced(const Submessage& submessage, std::uint32_t writer,
+                                                     Bytes payload) {
+  Reachable reachable;
   if (is_announcement_writer(writer)) {
-    if (const Fault fault = check_announcement(payload, named_, edited_, lease_seconds)) return fault;
+    if (const Fault fault = check_announcement(payload, named_, edited_, reachable)) return fault;
   }
   if (is_liveliness_writer(writer) && payload.size() < 24) return Dropped::kLength;
   if (writer != kAnnouncer || received_.relayed) return {};
   const MutexLock lock(memory_.mutex);
-  return memory_.participants.announced(source_, received_.socket, std::chrono::seconds(lease_seconds), received_.now);
+  if (memory_.is_own(source_)) return {};
+  const auto admission =
+      memory_.participants.announced(source_, received_.socket, reachable, received_.secured, received_.now);
+  memory_.note_strangers();
+  const auto lease = static_cast<std::uint32_t>(admission.lease.count());
+  if (admission.ignored) {
+    blank(submessage);
+  } else if (!admission.dropped && lease < reachable.lease_seconds) {
+    edited_.put(reachable.lease.first(4), lease, reachable.little_endian);
+  }
+  return admission.dropped;
 }
 
 std::optional<Dropped> MessageCheck::check_fragments(const Submessage& submessage) {

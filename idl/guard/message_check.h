@@ -20,6 +20,7 @@ class MessageCheck {
     std::uint64_t socket = 0;
     SequenceWatch::Time now{};
     bool relayed = false;  // a Relay sent it
+    bool secured = false;  // participants prove who they are
   };
   MessageCheck(Circumstances received, GuardMemory& memory, Bytes message, EditedMessage& edited)
       : received_(received), memory_(memory), message_(message), edited_(edited) {}
@@ -34,7 +35,11 @@ class MessageCheck {
   Fault check_data(const Submessage& submessage);
   Fault check_relayed_data(const Submessage& submessage);
   void make_gap(const Submessage& data, std::int64_t number);
-  Fault check_announced(std::uint32_t writer, Bytes payload);
+  void blank(const Submessage& submessage);
+  [[nodiscard]] bool is_unproven(std::uint32_t writer) const;
+  void ignore_end(std::uint32_t writer, const Submessage& data, std::int64_t number);
+  Fault check_destination(const Submessage& submessage);
+  Fault check_announced(const Submessage& submessage, std::uint32_t writer, Bytes payload);
   Fault check_fragments(const Submessage& submessage);
   Fault cut_too_large(const Submessage& submessage, Bytes payload, std::uint32_t sample_size);
   Fault check_heartbeat(const Submessage& submessage);
@@ -50,8 +55,9 @@ class MessageCheck {
   GuardMemory& memory_;
   const Bytes message_;
   EditedMessage& edited_;
-  Bytes source_{};  // prefix
-  Bytes named_{};   // the prefix that announcements must name; empty: any
+  Bytes source_{};       // prefix
+  Bytes named_{};        // the prefix that announcements must name; empty: any
+  bool signed_ = false;  // the library holds the whole message against its sender's key
 };
 
 }  // namespace trammel::wire

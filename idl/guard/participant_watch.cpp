@@ -4,10 +4,28 @@
 #include <utility>
 
 namespace trammel::wire {
+namespace {
+
+EndpointKey key_of_socket(std::uint64_t socket) {
+  EndpointKey key;
+  std::memcpy(key.prefix.data(), &socket, sizeof socket);
+  return key;
+}
+
+/// FNV-1a, of words.
+std::uint64_t said_in(const Reachable& reachable) {
+  std::uint64_t mixed = 0xcbf29ce484222325u;
+  const auto mix = [&mixed](std::uint64_t word) { mixed = (mixed ^ word) * 0x100000001b3u; };
+  mix(reachable.lease_seconds);
+  for (const std::uint64_t socket : reachable.sockets.all()) mix(socket);
+  return mixed;
+}
+
+}  // namespace
 
 bool ParticipantWatch::may_be_new(Time now) {
   const double since_s = std::chrono::duration<double>(now - refilled_).count();
-  allowed_ = std::min(kNewAtOnce, allowed_ + kNewPerSecond * since_s);
+  allowed_ = std::min(kStrangersAtOnce, allowed_ + kStrangersPerSecond * since_s);
   refilled_ = now;
   if (allowed_ < 1) return false;
   --allowed_;
@@ -15,29 +33,94 @@ bool ParticipantWatch::may_be_new(Time now) {
 }
 
 bool ParticipantWatch::has_room(const EndpointKey& key, Time now) {
-  const std::size_t known = participants_.count([now](const Participant& one) { return one.until > now; });
-  if (known < kCrowd) return true;
-  Stranger& stranger = strangers_.at(key, now);
-  return std::exchange(stranger.seen, true) && known < kMost;
+  if (participants_.count([now](const Participant& one) { return one.until > now; }) >= kMost) return false;
+  return strangers_.size() < kCrowd || std::exchange(seen_.at(key, now).before, true);
 }
 
-std::optional<Dropped> ParticipantWatch::announced(Bytes prefix, std::uint64_t socket, std::chrono::seconds lease,
-                                                   Time now) {
+ParticipantWatch::Admission ParticipantWatch::announced(Bytes prefix, std::uint64_t socket, const Reachable& reachable,
+                                                        bool pinned, Time now) {
   const EndpointKey key = key_of(prefix, 0);
-  if (Participant* known = participants_.find(key, now); known != nullptr && known->until > now) {
-    known->until = now + lease;
-    return {};
+  const std::chrono::seconds lease(reachable.lease_seconds), short_lease = std::min(lease, kStrangersLease);
+  Participant* const known = participants_.find(key, now);
+  const bool is_known = known != nullptr && known->until > now;
+  if (is_known && !known->is_stranger) {
+    if (pinned && known->said != said_in(reachable)) return {{}, lease, true};
+    hear_again(key, *known, reachable, now);
+    return {{}, lease};
   }
-  EndpointKey address;
-  std::memcpy(address.prefix.data(), &socket, sizeof socket);
-  Socket& from = sockets_.at(address, now);
+  // Without a lease that can be cut the library would keep a stranger for kUsualLeaseSeconds.
+  if (reachable.lease.empty()) return {Dropped::kParticipants};
+  forget_strangers(now);
+  if (is_known) {
+    hear_again(key, *known, reachable, now);
+    return {{}, short_lease};
+  }
+  Socket& from = sockets_.at(key_of_socket(socket), now);
   if (now - from.since > kWindow) from = {now, 0};
-  if (from.participants >= kNewOfOneSocket || !has_room(key, now) || !may_be_new(now)) return Dropped::kParticipants;
+  if (from.participants >= kNewOfOneSocket || !has_room(key, now) || !may_be_new(now)) return {Dropped::kParticipants};
   ++from.participants;
-  participants_.at(key, now).until = now + lease;
-  return {};
+  participants_.at(key, now) = {now + short_lease, true, said_in(reachable)};
+  strangers_.push_back({key, now + short_lease, kAnswers, reachable.sockets});
+  return {{}, short_lease};
 }
 
-void ParticipantWatch::left(Bytes prefix) { participants_.forget(key_of(prefix, 0)); }
+void ParticipantWatch::hear_again(const EndpointKey& key, Participant& known, const Reachable& reachable, Time now) {
+  const std::chrono::seconds lease(reachable.lease_seconds);
+  known.until = now + (known.is_stranger ? std::min(lease, kStrangersLease) : lease);
+  known.said = said_in(reachable);
+  if (!known.is_stranger) return note_sockets(reachable.sockets, now, known.until);
+  if (Stranger* one = stranger(key))
+    *one = {key, known.until, std::min(one->answers, kAnswers) + kAnswers, reachable.sockets};
+}
+
+void ParticipantWatch::spoke(Bytes prefix, Time now) {
+  const EndpointKey key = key_of(prefix, 0);
+  Participant* known = participants_.find(key, now);
+  if (known == nullptr || !known->is_stranger) return;
+  known->is_stranger = false;
+  allowed_ = std::min(kStrangersAtOnce, allowed_ + 1);
+  if (const Stranger* one = stranger(key)) note_sockets(one->sockets, now, known->until);
+  forget_stranger(key);
+}
+
+void ParticipantWatch::left(Bytes prefix) {
+  const EndpointKey key = key_of(prefix, 0);
+  participants_.forget(key);
+  forget_stranger(key);
+}
+
+void ParticipantWatch::forget_strangers(Time now) {
+  std::erase_if(strangers_, [now](const Stranger& one) { return one.until <= now; });
+}
+
+void ParticipantWatch::forget_stranger(const EndpointKey& key) {
+  std::erase_if(strangers_, [&key](const Stranger& one) { return one.key == key; });
+}
+
+ParticipantWatch::Stranger* ParticipantWatch::stranger(const EndpointKey& key) {
+  const auto found =
+      std::find_if(strangers_.begin(), strangers_.end(), [&key](const Stranger& one) { return one.key == key; });
+  return found == strangers_.end() ? nullptr : &*found;
+}
+
+void ParticipantWatch::note_sockets(const NamedSockets& sockets, Time now, Time until) {
+  for (const std::uint64_t socket : sockets.all()) listens_.at(key_of_socket(socket), now).until = until;
+}
+
+bool ParticipantWatch::lets_out(std::uint64_t socket, Time now) {
+  forget_strangers(now);
+  const Listens* known = listens_.find(key_of_socket(socket), now);
+  if (known != nullptr && known->until > now) return true;
+  bool named = false;
+  for (Stranger& one : strangers_) {
+    const auto sockets = one.sockets.all();
+    if (std::find(sockets.begin(), sockets.end(), socket) == sockets.end()) continue;
+    named = true;
+    if (one.answers <= 0) continue;
+    --one.answers;
+    return true;
+  }
+  return !named;
+}
 
 }  // namespace trammel::wire

@@ -41,6 +41,9 @@ void look_at_cells(const ServerConfig& config, StartCheck& check) {
     switch (one.state) {
       case CellAtStart::State::kServed:
         break;
+      case CellAtStart::State::kCopyServed:
+        check.notes.push_back(one.why);
+        break;
       case CellAtStart::State::kOlderServed:
         check.notes.push_back(fmt::format("cell {} would be served with an older version: {}", one.cell, one.why));
         break;

@@ -35,6 +35,8 @@ State state_of(const CellTrouble& trouble) {
       return State::kUnreadable;
     case CellTrouble::Kind::kOlderServed:
       return State::kOlderServed;
+    case CellTrouble::Kind::kCopyServed:
+      return State::kCopyServed;
   }
   return State::kUnreadable;
 }
@@ -89,10 +91,13 @@ std::string words_of_trouble(const std::string& kind) {
 /// What does not stop it from answering.
 std::vector<std::string> notes_of(const Watched& server) {
   std::vector<std::string> notes;
-  if (const StoreState state = server.store.state(); state.why_not_written)
+  const StoreState state = server.store.state();
+  if (state.why_not_written)
     notes.push_back(fmt::format("the store cannot be {}: {}",
                                 state.readable ? "written" : "read, copies of its models are served",
                                 sentence(*state.why_not_written)));
+  if (!state.clock.empty()) notes.push_back(state.clock);
+  notes.insert(notes.end(), state.damages.begin(), state.damages.end());
   if (const auto replica = server.figures().replica) {
     for (const std::string& kind : replica->troubles) notes.push_back(words_of_trouble(kind));
   }
@@ -132,6 +137,8 @@ const char* to_text(CellReadiness::State state) {
       return "served";
     case State::kOnDisk:
       return "on_disk";
+    case State::kCopyServed:
+      return "copy_served";
     case State::kOlderServed:
       return "older_served";
     case State::kLoading:

@@ -89,6 +89,11 @@ void prepare_audit(SQLite::Database& database, bool is_new, int schema_before) {
                                       count("batches"), count("models"), count("activations"))});
 }
 
+std::int64_t last_audit_at(SQLite::Database& database) {
+  SQLite::Statement row(database, "SELECT at FROM audit ORDER BY number DESC LIMIT 1");
+  return row.executeStep() ? row.getColumn(0).getInt64() : 0;
+}
+
 std::int64_t audit_rows(SQLite::Database& database) { return end_of(database).rows; }
 
 bool read_more(SQLite::Database& database, const AuditQuery& query, AuditChain& chain, AuditTrail& trail) {

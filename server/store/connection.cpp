@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "server/base/unix_time.h"
+#include "server/store/audit_rows.h"
 
 namespace trammel {
 namespace {
@@ -38,6 +39,13 @@ void StoreConnection::note_opened() {
   was_written_ = true;
   mark_ = mark_of(*database);
   file.remember();
+  const std::int64_t behind = last_audit_at(*database) - unix_now();
+  const MutexLock guard(state_mutex);
+  if (behind >= ClockWatch::kNoticed.count() && state_now.clock.empty())
+    state_now.clock = fmt::format(
+        "the host's clock is {} s behind the last change in the store: one of the two is dated "
+        "wrongly (trammel audit shows them)",
+        behind);
 }
 
 bool StoreConnection::is_in_order() {
@@ -150,6 +158,20 @@ void StoreConnection::note_damage(const std::string& what) {
   auto& damages = state_now.damages;
   if (damages.size() < kMostDamages && std::find(damages.begin(), damages.end(), what) == damages.end())
     damages.push_back(what);
+}
+
+std::optional<std::chrono::seconds> StoreConnection::note_clock() {
+  const MutexLock guard(state_mutex);
+  const auto step = clock.look(ClockWatch::now());
+  if (!step) return step;
+  const auto off = clock.off();
+  state_now.clock = off.count() == 0
+                        ? ""
+                        : fmt::format(
+                              "the host's clock was set by {:+} s while the service ran: dates from before, or "
+                              "since, are wrong (trammel audit says when)",
+                              off.count());
+  return step;
 }
 
 }  // namespace trammel

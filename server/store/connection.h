@@ -12,6 +12,7 @@
 
 #include "server/base/mutex.h"
 #include "server/base/result.h"
+#include "server/store/clock_watch.h"
 #include "server/store/open_database.h"
 #include "server/store/schema.h"
 #include "server/store/served_copies.h"
@@ -66,6 +67,8 @@ struct StoreConnection {
   void note_written();
   /// Something that was found damaged; said once.
   void note_damage(const std::string& what);
+  /// By how much the host's clock was set since this was called last; empty: it was not.
+  [[nodiscard]] std::optional<std::chrono::seconds> note_clock();
 
   const std::string path;
   const WriterLock lock;
@@ -76,6 +79,7 @@ struct StoreConnection {
   mutable Mutex state_mutex;                                             // taken last, and for moments only
   Condition state_changed;
   StoreState state_now TRAMMEL_GUARDED_BY(state_mutex);
+  ClockWatch clock TRAMMEL_GUARDED_BY(state_mutex){ClockWatch::now()};
 
  private:
   template <typename Work>

@@ -405,20 +405,22 @@ Result<std::string> Store::model_text(const std::string& cell, int version) cons
   });
 }
 
+Result<ReadModel> Store::read(const std::string& cell, int version) const {
+  ModelOnDisk on_disk{cell, version, model_text(cell, version), "", connection_->copies->files_of(cell, version)};
+  const auto hash = connection_->exclusively([&](SQLite::Database& database) -> Result<std::string> {
+    auto row = prepare(database, "SELECT hash FROM models WHERE cell = ? AND version = ?", cell, version);
+    return row.executeStep() ? row.getColumn(0).getString() : std::string();
+  });
+  if (hash) on_disk.hash = *hash;
+  auto model = read_model(on_disk, fmt::format("{}: model {}@{}", connection_->path, cell, version));
+  if (model && !model->damage.empty()) connection_->note_damage(model->damage);
+  return model;
+}
+
 Result<CompensatedModel> Store::model(const std::string& cell, int version) const {
-  const std::string where = fmt::format("{}: model {}@{}", connection_->path, cell, version);
-  const auto content = model_text(cell, version);
-  auto stored = content ? deserialize(*content, where, ModelTexts::kAsTheyAre)
-                        : Result<CompensatedModel>(tl::make_unexpected(content.error()));
-  if (stored) return stored;
-  for (const ServedCopies::Copy& copy : connection_->copies->of(cell)) {
-    if (copy.version != version) continue;
-    auto copied = model_in(copy);
-    if (!copied) continue;
-    connection_->note_damage(fmt::format("{}; its copy is served", sentence(stored.error())));
-    return copied;
-  }
-  return stored;
+  auto read_one = read(cell, version);
+  if (!read_one) return tl::make_unexpected(read_one.error());
+  return std::move(read_one->model);
 }
 
 Result<std::optional<int>> Store::version_in_force(const std::string& cell) const {

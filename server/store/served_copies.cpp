@@ -139,6 +139,14 @@ std::vector<ServedCopies::Copy> ServedCopies::of(const std::string& cell) const 
   return copies;
 }
 
+std::vector<std::string> ServedCopies::files_of(const std::string& cell, int version) const {
+  std::vector<std::string> files;
+  for (Copy& copy : of(cell)) {
+    if (copy.version == version) files.push_back(std::move(copy.file));
+  }
+  return files;
+}
+
 Status ServedCopies::keep(const std::string& cell, std::int64_t activation, int version,
                           const std::string& content) const {
   const std::string where = folder(cell);

@@ -28,6 +28,7 @@ class ServedCopies {
   [[nodiscard]] Status belong_to(const std::string& store, bool served);
   /// Newest first; none where they cannot be read.
   [[nodiscard]] std::vector<Copy> of(const std::string& cell) const;
+  [[nodiscard]] std::vector<std::string> files_of(const std::string& cell, int version) const;
   /// On disk when it returns. Takes the place of an older copy of the same version.
   [[nodiscard]] Status keep(const std::string& cell, std::int64_t activation, int version,
                             const std::string& content) const;

@@ -5,8 +5,11 @@
 #include <system_error>
 #include <utility>
 
+#include "server/base/text_file.h"
+#include "server/compensate/model_file.h"
 #include "server/store/file_header.h"
 #include "server/store/open_database.h"
+#include "server/store/served_copies.h"
 #include "server/store/statements.h"
 
 namespace trammel {
@@ -26,7 +29,42 @@ auto reading(const std::string& path, const Work& work) -> decltype(work(std::de
   }
 }
 
+Result<CompensatedModel> model_in(const Result<std::string>& text, const std::string& where) {
+  if (!text) return tl::make_unexpected(text.error());
+  return deserialize(*text, where, ModelTexts::kAsTheyAre);
+}
+
+Result<CompensatedModel> model_of_hash(const ModelOnDisk& on_disk, const std::string& where) {
+  auto model = model_in(on_disk.text, where);
+  if (model && model->provenance().hash != on_disk.hash)
+    return failure(ErrorCode::kInternal, "the text is that of another model, sha256 {} instead of {}",
+                   model->provenance().hash, on_disk.hash)
+        .in(where);
+  return model;
+}
+
+/// The copies of the store that is open.
+void find_copies(SQLite::Database& database, ServedCopies& copies) {
+  if (!database.tableExists("store_identity")) return;
+  SQLite::Statement id(database, "SELECT id FROM store_identity WHERE id != ''");
+  if (id.executeStep()) static_cast<void>(copies.belong_to(id.getColumn(0).getString(), false));
+}
+
 }  // namespace
+
+Result<ReadModel> read_model(const ModelOnDisk& on_disk, const std::string& where) {
+  auto stored = model_of_hash(on_disk, where);
+  if (stored) return ReadModel{std::move(*stored)};
+  for (const std::string& file : on_disk.copies) {
+    auto copied = model_in(read_text_file(file), file);
+    if (!copied) continue;
+    return ReadModel{std::move(*copied),
+                     fmt::format("cell {}: version {} is served from its copy {}, since the text in "
+                                 "the store is bad: {}",
+                                 on_disk.cell, on_disk.version, file, sentence(stored.error()))};
+  }
+  return tl::make_unexpected(stored.error());
+}
 
 Result<ServedModels> ServedModels::open(const std::string& path) {
   std::error_code error;
@@ -47,6 +85,8 @@ Result<bool> ServedModels::has(const std::string& cell) const {
 Result<bool> ServedModels::find(const std::string& cell, const ModelVisitor& serves) const {
   if (path_.empty()) return false;
   return reading(path_, [&](SQLite::Database& database) -> Result<bool> {
+    ServedCopies copies(path_);
+    find_copies(database, copies);
     auto at =
         prepare(database,
                 "WITH RECURSIVE chain (number, version, back, step) AS ("
@@ -54,11 +94,14 @@ Result<bool> ServedModels::find(const std::string& cell, const ModelVisitor& ser
                 "ORDER BY number DESC LIMIT 1) UNION ALL "
                 "SELECT a.number, a.version, a.back, step + 1 FROM chain JOIN activations a ON a.number = chain.back "
                 "WHERE step + 1 < ?2) "
-                "SELECT models.version, models.content FROM chain JOIN models "
+                "SELECT models.version, models.content, models.hash FROM chain JOIN models "
                 "ON models.cell = ?1 AND models.version = chain.version ORDER BY step",
                 cell, kMostLookedAt);
     while (at.executeStep()) {
-      if (serves(at.getColumn(0).getInt(), at.getColumn(1).getString())) return true;
+      const int version = at.getColumn(0).getInt();
+      if (serves({cell, version, at.getColumn(1).getString(), at.getColumn(2).getString(),
+                  copies.files_of(cell, version)}))
+        return true;
     }
     return false;
   });

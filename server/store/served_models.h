@@ -5,12 +5,29 @@
 #include <vector>
 
 #include "server/base/result.h"
+#include "server/compensate/compensated_model.h"
 
 namespace trammel {
 
-/// The texts of the versions that a cell would be served with, the one in force first, then those before it. `serves`
-/// says whether one is good, and ends it. False: none was.
-using ModelVisitor = std::function<bool(int version, const std::string& text)>;
+/// A version of a cell's model as it is on disk.
+struct ModelOnDisk {
+  std::string cell;
+  int version = 0;
+  Result<std::string> text;         ///< in the store
+  std::string hash;                 ///< that the store knows it by
+  std::vector<std::string> copies;  ///< files beside the store
+};
+/// A model, and why it was not read from the store but from a copy: one sentence, or empty.
+struct ReadModel {
+  CompensatedModel model;
+  std::string damage = {};
+};
+/// From the store or, where its text is bad or that of another model, from a copy. `where`: for what is wrong.
+[[nodiscard]] Result<ReadModel> read_model(const ModelOnDisk& on_disk, const std::string& where);
+
+/// The versions that a cell would be served with, the one in force first, then those before it. The visitor says
+/// whether one is good, and ends it. False: none was.
+using ModelVisitor = std::function<bool(const ModelOnDisk&)>;
 
 /// A store's file, read without changing it, also while a service writes it and if it is of an older schema.
 class ServedModels {

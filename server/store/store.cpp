@@ -4,6 +4,8 @@
 #include <memory>
 #include <utility>
 
+#include "server/base/unix_time.h"
+#include "server/store/audit_rows.h"
 #include "server/store/connection.h"
 #include "server/store/store_file.h"
 
@@ -27,7 +29,25 @@ Result<std::unique_ptr<Store>> Store::open(const std::string& path) {
 
 StoreState Store::state() const { return connection_->state(); }
 
+namespace {
+
+/// A clock that was set stands in the trail, between what was dated by it before and after. Where that cannot be
+/// written, the state says so all the same.
+void look_at_clock(StoreConnection& connection) {
+  const auto step = connection.note_clock();
+  if (!step) return;
+  static_cast<void>(connection.in_transaction([&step](SQLite::Database& database) -> Status {
+    const std::int64_t now = unix_now();
+    record_audit(database, {"", "clock", "clock", fmt::format("{} s since 1970", now - step->count()),
+                            fmt::format("{} s since 1970", now), fmt::format("set by {:+} s", step->count())});
+    return {};
+  }));
+}
+
+}  // namespace
+
 Status Store::try_again() {
+  look_at_clock(*connection_);
   if (connection_->is_in_order()) return {};
   return connection_->in_transaction([](SQLite::Database& database) -> Status {
     // Of an update that changes nothing SQLite writes nothing.

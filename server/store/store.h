@@ -14,6 +14,7 @@
 #include "server/store/audit.h"
 #include "server/store/change_id.h"
 #include "server/store/job_outcome.h"
+#include "server/store/served_models.h"
 #include "server/store/store_state.h"
 
 /// Everything that survives a restart: batches, jobs, models and their history, in one SQLite file (WAL,
@@ -265,6 +266,7 @@ class Store {
   /// Oldest first, without their content.
   [[nodiscard]] Result<std::vector<StoredModel>> models(const std::string& cell) const;
   /// From the store or, where that does not give it, from its copy.
+  [[nodiscard]] Result<ReadModel> read(const std::string& cell, int version) const;
   [[nodiscard]] Result<CompensatedModel> model(const std::string& cell, int version) const;
   /// The same as it is stored, not checked. kNotFound also where it was pruned.
   [[nodiscard]] Result<std::string> model_text(const std::string& cell, int version) const;

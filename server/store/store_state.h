@@ -15,6 +15,7 @@ struct StoreState {
   bool readable = true;                  ///< false: only the copies of the models that were in force are there
   std::int64_t since = 0;                ///< Unix time, s, of the last change of either; 0: none since it was opened
   std::uint64_t failed_writes = 0;
+  std::string clock;  ///< one sentence: the host's clock was set, what is dated may be wrong; empty: it was not
   std::vector<std::string> damages;  ///< what was found damaged since it was opened, the first hundred
 };
 

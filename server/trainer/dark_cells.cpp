@@ -1,6 +1,5 @@
 #include "server/trainer/dark_cells.h"
 
-#include "server/compensate/model_file.h"
 #include "server/store/served_models.h"
 #include "server/trainer/acceptance/fits_cell.h"
 
@@ -12,15 +11,20 @@ using State = CellAtStart::State;
 Result<CellAtStart> look_at(const ServedModels& models, const std::string& name, const Cell& cell) {
   CellAtStart one{name, State::kDark};
   bool fits_not = false;
-  const auto served = models.find(name, [&](int version, const std::string& text) {
-    const std::string where = fmt::format("version {} of cell {}", version, name);
-    const auto model = deserialize(text, where, ModelTexts::kAsTheyAre);
-    Status good = model ? check_fits_cell(*model, cell, where) : Status(tl::make_unexpected(model.error()));
-    fits_not = model && !good;
-    if (one.version == 0) one.version = version;
-    if (good && one.why.empty()) one.state = State::kServed;
-    if (good && !one.why.empty()) one.state = State::kOlderServed;
-    if (!good && one.why.empty()) one.why = sentence(good.error());
+  const auto served = models.find(name, [&](const ModelOnDisk& on_disk) {
+    const std::string where = fmt::format("version {} of cell {}", on_disk.version, name);
+    const auto read = read_model(on_disk, where);
+    Status good = read ? check_fits_cell(read->model, cell, where) : Status(tl::make_unexpected(read.error()));
+    fits_not = read && !good;
+    if (one.version == 0) one.version = on_disk.version;
+    if (good && !one.why.empty()) {
+      one.state = State::kOlderServed;
+    } else if (good) {
+      one.state = read->damage.empty() ? State::kServed : State::kCopyServed;
+      one.why = read->damage;
+    } else if (one.why.empty()) {
+      one.why = sentence(good.error());
+    }
     return good || fits_not;  // of a model that does not fit, no other version takes the place
   });
   if (!served) return tl::make_unexpected(served.error());

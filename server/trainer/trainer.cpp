@@ -241,8 +241,11 @@ std::vector<std::string> Trainer::troubles() const {
   std::vector<std::string> all;
   StoreState state = store_.state();
   if (state.why_not_written) all.push_back("the store cannot be written: " + sentence(*state.why_not_written));
+  if (!state.clock.empty()) all.push_back(state.clock);
   for (std::string& damage : state.damages) all.push_back(std::move(damage));
-  for (std::string& trouble : history_.troubles()) all.push_back(std::move(trouble));
+  for (std::string& trouble : history_.troubles()) {
+    if (std::find(all.begin(), all.end(), trouble) == all.end()) all.push_back(std::move(trouble));
+  }
   return all;
 }
 

@@ -93,6 +93,8 @@ class RawClient final : private wire::dds::DataWriterListener, private wire::dds
     const std::lock_guard lock(mutex_);
     return matched_ > 0 && answers_ > 0;
   }
+  /// Its GUID; the first twelve are those of its participant.
+  [[nodiscard]] std::array<std::uint8_t, 16> writer_octets() const { return wire::octets_of(writer_->guid()); }
   void send(Bytes bytes) { writer_->write(&bytes); }
   void fill_in(wire::RequestHeader& header, std::int64_t sequence_number) const {
     header.request_id().writer_guid(wire::octets_of(writer_->guid()));

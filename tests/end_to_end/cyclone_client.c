@@ -1,5 +1,6 @@
 /* A client built with another maker's DDS from the same IDL. Waits for a server's status, asks it for one prediction,
- * has the nominal pose of these joints corrected, and prints all three. Usage: cyclone_client DOMAIN CELL [LIMIT_S].
+ * has the nominal pose of these joints corrected, and prints all three. POSES: asks for the prediction as often, in one
+ * request. Usage: cyclone_client DOMAIN CELL [LIMIT_S [POSES]].
  * The network is set by CYCLONEDDS_URI. */
 #include <dds/dds.h>
 #include <math.h>
@@ -124,8 +125,9 @@ static int correct(dds_entity_t participant, dds_entity_t subscriber, const char
 }
 
 int main(int argc, char** argv) {
-  if (argc != 3 && argc != 4) return fail("usage: cyclone_client DOMAIN CELL [LIMIT_S]");
-  if (argc == 4) limit = DDS_SECS(atoi(argv[3]));
+  if (argc < 3 || argc > 5) return fail("usage: cyclone_client DOMAIN CELL [LIMIT_S [POSES]]");
+  if (argc > 3) limit = DDS_SECS(atoi(argv[3]));
+  const uint32_t poses = argc > 4 ? (uint32_t)atoi(argv[4]) : 1;
   /* Without it Cyclone DDS would speak on every interface; with it, on the loopback profile that it holds. */
   if (getenv("CYCLONEDDS_URI") == NULL) return fail("CYCLONEDDS_URI must hold the loopback profile");
   const dds_entity_t participant = dds_create_participant((dds_domainid_t)atoi(argv[1]), NULL, NULL);
@@ -169,9 +171,9 @@ int main(int argc, char** argv) {
   trammel_wire_v2_PredictErrorRequest request;
   memset(&request, 0, sizeof request);
   begin(&request.header, &request.about, &guid, status->server, argv[2]);
-  request.poses._maximum = 1;
-  request.poses._length = 1;
-  request.poses._buffer = &pose;
+  request.poses._maximum = request.poses._length = poses;
+  request.poses._buffer = dds_alloc(poses * sizeof pose);
+  for (uint32_t i = 0; i < poses; ++i) request.poses._buffer[i] = pose;
   if (dds_write(request_writer, &request) != DDS_RETCODE_OK) return fail("cannot write the request");
 
   const trammel_wire_v2_PredictErrorReply* reply = take_one(participant, reply_reader);
@@ -180,7 +182,7 @@ int main(int argc, char** argv) {
   printf("result=%d id=%lld ours=%d trace=%s model=%s version=%d items=%u\n", (int)reply->header.result,
          (long long)reply->header.related_request_id.sequence_number, is_ours, reply->header.trace_id,
          reply->model.hash, reply->model.version, reply->predictions._length);
-  if (reply->predictions._length != 1) return fail("no prediction");
+  if (reply->predictions._length != poses) return fail("not as many predictions as poses");
   const trammel_wire_v2_PredictedError* predicted = &reply->predictions._buffer[0];
   printf("dx_mm=%.6f\n", predicted->dx_mm);
   const int failed = correct(participant, subscriber, status->server, argv[2], &predicted->nominal, &pose);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -172,6 +173,55 @@ TEST(HostilePackets, ADaemonIsAliveAndRightAfter300000MutatedOnes) {
   EXPECT_EQ(answers_of(daemon), before);
   EXPECT_TRUE(daemon.process().wait_for_line("packets were dropped unread", kLimit)) << "and says what it met";
   EXPECT_EQ(daemon.stop(), 0) << daemon.process().standard_error();
+}
+
+/// Announces participants that are not there, once each, sixteen from a socket.
+void invent(const test::Daemon& daemon, int participants) {
+  std::unique_ptr<RawParticipant> from;
+  for (int i = 0; i < participants; ++i) {
+    if (i % 16 == 0)
+      from = std::make_unique<RawParticipant>(daemon.port(), daemon.domain(), static_cast<unsigned>(i + 1));
+    test::Prefix prefix = from->prefix();
+    prefix[11] = static_cast<unsigned char>(i % 16);
+    from->set_prefix(prefix);
+    from->send(test::Packet(prefix).data({0, test::kAnnouncerId, 1, {}, from->announcement().payload()}).bytes());
+  }
+}
+
+TEST(HostilePackets, AmongTwoThousandInventedParticipantsNewcomersFindTheDaemonAndItOutlivesThem) {
+  test::Daemon daemon;
+  daemon.start();
+  const std::string before = answers_of(daemon);
+  for (int round = 0; round < 3; ++round) {
+    invent(daemon, 1000);
+    EXPECT_EQ(answers_of(daemon), before) << "somebody new";
+  }
+  // Their leases end meanwhile.
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(12);
+  const auto session = client::Session::open(daemon.session_options()).value();
+  while (std::chrono::steady_clock::now() < until) ASSERT_TRUE(session->models("cell-7"));
+  EXPECT_EQ(daemon.stop(), 0) << daemon.process().standard_error();
+}
+
+TEST(HostilePackets, AnAnnouncementThatNamesSocketsOfOthersSendsThemNextToNothing) {
+  test::Daemon daemon;
+  daemon.start();
+  std::vector<std::unique_ptr<RawParticipant>> others;
+  for (unsigned i = 0; i < 16; ++i)
+    others.push_back(std::make_unique<RawParticipant>(daemon.port(), daemon.domain(), i + 1));
+  RawParticipant stranger(daemon.port(), daemon.domain(), 99);
+  ParameterList names = stranger.announcement();
+  for (const auto& other : others) names.locator(0x0032, other->own_port());
+  stranger.send(test::Packet(stranger.prefix()).data({0, test::kAnnouncerId, 1, {}, names.payload()}).bytes());
+  int datagrams = 0;
+  const auto session = client::Session::open(daemon.session_options()).value();
+  for (int i = 0; i < 3; ++i) {
+    for (const auto& other : others) {
+      while (other->receive(std::chrono::milliseconds(60))) ++datagrams;
+    }
+    EXPECT_TRUE(session->models("cell-7"));
+  }
+  EXPECT_LE(datagrams, 8);
 }
 
 TEST(HostilePackets, HonestClientsLoseNothingWhileOthersAreKilled) {

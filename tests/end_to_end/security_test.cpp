@@ -14,6 +14,7 @@
 #include "tests/dds/raw_client.h"
 #include "tests/support/daemon.h"
 #include "tests/support/http_client.h"
+#include "tests/support/raw_participant.h"
 #include "tests/support/virtual_cell.h"
 
 namespace trammel {
@@ -258,6 +259,29 @@ TEST_F(SecurityTest, AnswersDoNotGoToAPartitionOfSomebodyElseWhateverTheCertific
   victim.send(request, 1);
   EXPECT_EQ(victim.wait_for_replies(1).size(), 1U) << "its own answer, and none to the other's question";
   EXPECT_EQ(victim.replies(), 1U);
+}
+
+TEST_F(SecurityTest, ADatagramWithoutACertificateSendsNobodyAway) {
+  daemon_.start();
+  test::RawClient<wire::ReadModels> client(daemon_.domain(), daemon_.port(), "of-cam", keys().of("cam", "cam-1"));
+  ASSERT_TRUE(client.wait_until_matched());
+  test::Prefix who{};
+  const auto octets = client.writer_octets();
+  std::copy_n(octets.begin(), who.size(), who.begin());
+  test::RawParticipant stranger(daemon_.port(), daemon_.domain());
+  stranger.set_prefix(who);
+  wire::ReadModelsRequest request;
+  request.what(wire::READ_MODELS);
+  request.about().cell("cell-7");
+  const auto gone = test::ParameterList().guid(0x0070, who, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
+  const auto short_lived = stranger.announcement().add(0x0002, {0, 0, 0, 0, 1, 0, 0, 0}).payload();
+  for (std::int64_t number = 1; number <= 50; ++number) {
+    stranger.send(test::Packet(who).data({0, test::kAnnouncerId, 1000 + number, gone, {}}).bytes());
+    stranger.send(test::Packet(who).data({0, test::kAnnouncerId, 2000 + number, {}, short_lived}).bytes());
+    client.send(request, number);
+    ASSERT_GE(client.wait_for_replies(static_cast<std::size_t>(number)).size(), static_cast<std::size_t>(number));
+    ASSERT_TRUE(client.is_matched()) << "it was sent away, and has come back";
+  }
 }
 
 TEST_F(SecurityTest, WhatIsWrongWithAFolderIsSaidBeforeAnythingIsSent) {

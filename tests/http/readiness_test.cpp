@@ -155,6 +155,18 @@ TEST_F(ReadinessTest, AnOlderVersionThatIsServedInPlaceOfADamagedOneIsReadyAndNo
   EXPECT_NE(ready().told["noted"][0]["why"].get<std::string>().find("instead of a newer one"), std::string::npos);
 }
 
+TEST_F(ReadinessTest, AModelThatIsServedFromItsCopyIsReadyAndItIsSaidWhichAndWhy) {
+  train("b1", 1);
+  server_.take_down();
+  replace_in_file(server_.store_path(), "\"batch_id\":\"b1\"", "\"batch_id\":\"xx\"");
+  server_.set_up();
+  take_up();
+  expect_ready(State::kCopyServed);
+  const std::string said = "version 1 is served from its copy " + server_.store_path() + ".models/";
+  EXPECT_NE(ready().told["noted"][0]["why"].get<std::string>().find(said), std::string::npos) << ready().told;
+  EXPECT_EQ(server_.trainer().troubles(), std::vector<std::string>{cell().why}) << "once";
+}
+
 TEST_F(ReadinessTest, AModelThatCannotBeReadIsDarkAndSaysWhy) {
   train("b1", 1);
   server_.take_down();

@@ -419,16 +419,37 @@ TEST_F(StoreFaults, WithoutCopiesADamagedModelIsAnErrorOfItsOwnAndOlderOnesAreSe
   EXPECT_EQ(served("cell-8"), 1);
 }
 
-TEST_F(StoreFaults, AModelThatIsDamagedInTheStoreIsServedFromItsCopyAndThatIsSaid) {
+TEST_F(StoreFaults, HoweverTheTextInForceIsDamagedItsCopyIsServedAndBothAreSaid) {
   open();
   put_in_force(1);
   put_in_force(2);
   store_.reset();
-  { SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("UPDATE models SET content = 'x' WHERE version = 2"); }
+  for (const char* const damage :
+       {"''", "'x'", "'{}'", "'null'", "substr(content, 1, length(content) / 2)", "substr(content, 2)",
+        "replace(content, '2', '3')", "replace(content, ':', '')", "upper(content)", "content || '}'",
+        "zeroblob(length(content))", "content || content",
+        "(SELECT content FROM models AS other WHERE other.version = 1)"}) {
+    SCOPED_TRACE(damage);
+    {
+      SQLite::Database file(path_, SQLite::OPEN_READWRITE);
+      file.exec("CREATE TABLE kept AS SELECT content FROM models WHERE version = 2");
+      file.exec(fmt::format("UPDATE models SET content = {} WHERE version = 2", damage));
+    }
+    open();
+    const auto read = store_->read("cell-7", 2);
+    ASSERT_TRUE(read) << sentence(read.error());
+    EXPECT_EQ(read->model.provenance().training_poses, 2);
+    EXPECT_NE(read->damage.find("version 2 is served from its copy " + path_ + ".models/"), std::string::npos)
+        << read->damage;
+    EXPECT_NE(read->damage.find("the text in the store is bad"), std::string::npos) << read->damage;
+    EXPECT_EQ(store_->state().damages, std::vector<std::string>{read->damage});
+    store_.reset();
+    SQLite::Database file(path_, SQLite::OPEN_READWRITE);
+    file.exec("UPDATE models SET content = (SELECT content FROM kept) WHERE version = 2");
+    file.exec("DROP TABLE kept");
+  }
   open();
-  EXPECT_EQ(served(), 2);
-  ASSERT_EQ(store_->state().damages.size(), 1u);
-  EXPECT_NE(store_->state().damages.front().find("its copy is served"), std::string::npos);
+  EXPECT_EQ(demand(store_->read("cell-7", 2)).damage, "");
 }
 
 TEST_F(StoreFaults, AStoreThatWasEmptiedOrIsNoStoreAnyMoreIsLeftAloneAndItsModelsAreServed) {

@@ -163,8 +163,8 @@ TEST_F(MigrationTest, AStoreOfEveryEarlierSchemaIsLookedAtAndCopiedWithoutBeingC
     const auto models = ServedModels::open(path);
     ASSERT_TRUE(models) << models.error().message;
     std::vector<int> versions;
-    EXPECT_FALSE(demand(models->find("cell-7", [&](int version, const std::string&) {
-      versions.push_back(version);
+    EXPECT_FALSE(demand(models->find("cell-7", [&](const ModelOnDisk& on_disk) {
+      versions.push_back(on_disk.version);
       return false;
     })));
     EXPECT_EQ(versions, (std::vector<int>{2, 1})) << "the one in force first";

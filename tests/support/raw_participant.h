@@ -25,6 +25,7 @@ class RawParticipant {
 
   [[nodiscard]] const Prefix& prefix() const { return prefix_; }
   void set_prefix(const Prefix& prefix) { prefix_ = prefix; }
+  [[nodiscard]] std::uint16_t own_port() const { return own_port_; }
   /// Of whom answered an announcement.
   [[nodiscard]] const Prefix& peer() const { return peer_; }
   /// A message of this participant to the other one.

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
 
 #include "server/store/store.h"
@@ -62,9 +63,18 @@ TEST_F(DarkCellsTest, ACellWhoseModelIsOfAnotherToolWouldGoDarkAndTheReasonIsSai
   EXPECT_NE(at_start("cell-7").why.find("spindle"), std::string::npos) << at_start("cell-7").why;
 }
 
+TEST_F(DarkCellsTest, AModelWhoseTextIsBadWouldBeServedFromItsCopyAndThatIsSaid) {
+  serve("cell-7", 40);
+  damage("\"training_poses\":40", "\"training_poses\":99");
+  EXPECT_EQ(at_start("cell-7").state, State::kCopyServed);
+  EXPECT_NE(at_start("cell-7").why.find("version 1 is served from its copy " + path_), std::string::npos)
+      << at_start("cell-7").why;
+}
+
 TEST_F(DarkCellsTest, AModelThatThisProgramCannotReadLeavesItsCellDarkUnlessAnOlderOneIsThere) {
   serve("cell-7", 40);
   serve("cell-7", 41);
+  std::filesystem::remove_all(path_ + ".models");
   damage("\"training_poses\":41", "\"training_poses\":99");
   EXPECT_EQ(at_start("cell-7").state, State::kOlderServed);
   EXPECT_NE(at_start("cell-7").why.find("version 2"), std::string::npos);

@@ -71,13 +71,13 @@ Status ModelHistory::announce_from_store(const std::string& cell) {
 Result<ServedModel> ModelHistory::load_in_force(const std::string& cell) {
   std::optional<Error> why_not;
   for (const int version : store_.versions_to_serve(cell)) {
-    auto model = store_.model(cell, version);
-    if (!model) {
-      if (!why_not) why_not = model.error();
+    auto read = store_.read(cell, version);
+    if (!read) {
+      if (!why_not) why_not = read.error();
       continue;
     }
     const auto fits =
-        check_fits_cell(*model, *cells_.now().at(cell), fmt::format("version {} of cell {}", version, cell));
+        check_fits_cell(read->model, *cells_.now().at(cell), fmt::format("version {} of cell {}", version, cell));
     if (!fits) {
       set_trouble(cell, CellTrouble{CellTrouble::Kind::kOfAnotherRobot, sentence(fits.error())});
       return tl::make_unexpected(fits.error());
@@ -85,12 +85,13 @@ Result<ServedModel> ModelHistory::load_in_force(const std::string& cell) {
     // A version that lost its copy gets a new one; where the store cannot give it, it was made from its copy.
     static_cast<void>(store_.copy_model_in_force(cell));
     std::optional<CellTrouble> trouble;
+    if (!read->damage.empty()) trouble = {CellTrouble::Kind::kCopyServed, read->damage};
     if (why_not)
       trouble = {
           CellTrouble::Kind::kOlderServed,
           fmt::format("cell {}: version {} is served instead of a newer one: {}", cell, version, sentence(*why_not))};
     set_trouble(cell, trouble);
-    return ServedModel{cell, version, std::move(*model)};
+    return ServedModel{cell, version, std::move(read->model)};
   }
   if (!why_not) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell);
   set_trouble(cell, CellTrouble{CellTrouble::Kind::kUnreadable,

@@ -46,12 +46,13 @@ struct ChangeRequest {
   std::optional<int> expected = {};  ///< the version served now, 0: none; with another one (kConflict) nothing changes
 };
 
-/// Why a cell is not served with the model that it should be served with.
+/// What is wrong with the model that a cell is served with, or why it is served with none.
 struct CellTrouble {
   enum class Kind {
     kOfAnotherRobot,  ///< not served: its robot or its tools are not the model's
     kUnreadable,      ///< not served: no version in force can be read
-    kOlderServed      ///< served with an older version
+    kOlderServed,     ///< served with an older version
+    kCopyServed       ///< served with the right one, which only its copy still has
   } kind = Kind::kUnreadable;
   std::string what;  ///< one sentence
 };
