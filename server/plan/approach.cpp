@@ -19,13 +19,14 @@ constexpr double kGrid = 1e-4;               // deg, mm: the four decimals of pr
 
 std::optional<JointVector> bump_pose(const Chain& robot, const JointVector& q, int direction) {
   TRAMMEL_CHECK(direction == 1 || direction == -1);
-  JointVector bump = q;
-  for (int j = 0; j < robot.size(); ++j) {
-    const Joint& joint = robot.joint(j);
-    const double way = joint.type == JointType::kRevolute ? kBumpAngle : kBumpLength;
-    bump(j) = std::clamp(q(j) - direction * way, joint.lower, joint.upper);
-    if (std::abs(bump(j) - q(j)) < kLeastBump * way) return std::nullopt;
-  }
+  JointVector way(robot.size());
+  for (int j = 0; j < robot.size(); ++j)
+    way(j) = direction * (robot.joint(j).type == JointType::kRevolute ? kBumpAngle : kBumpLength);
+  JointVector bump = q - robot.commanded(way);
+  for (int j = 0; j < robot.size(); ++j) bump(j) = std::clamp(bump(j), robot.joint(j).lower, robot.joint(j).upper);
+  const JointVector taken = robot.gear_angles(q - bump);
+  for (int j = 0; j < robot.size(); ++j)
+    if (taken(j) / way(j) < kLeastBump) return std::nullopt;
   return bump;
 }
 

@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <random>
 
+#include "server/base/units.h"
 #include "server/diagnose/diagnose.h"
 #include "server/measurement/sessions.h"
 #include "server/report/diagnosis_json.h"
@@ -12,19 +14,24 @@
 namespace trammel {
 namespace {
 
-/// Sessions of 50 poses, the tracker set up anew for each.
-Diagnosis diagnosis_of(const std::vector<VirtualRobot>& robots, std::uint64_t seed) {
-  const std::shared_ptr<const Cell>& cell = robots.front().truth.cell;
+Diagnosis diagnosis_of(const std::shared_ptr<const Cell>& cell, std::vector<MeasurementBatch> sessions) {
   std::vector<CheckedBatch> batches;
-  for (std::size_t s = 0; s < robots.size(); ++s) {
-    MeasurementBatch batch =
-        test::measured_on(robots[s], {.poses = 50, .seed = seed + 31 * s, .set_up_anew = s + 1 < robots.size()});
-    batch.id = fmt::format("day-{}", s + 1);
-    batches.push_back(test::demand(check_against_cell(std::move(batch), *cell)));
+  for (MeasurementBatch& session : sessions) {
+    session.id = fmt::format("day-{}", batches.size() + 1);
+    batches.push_back(test::demand(check_against_cell(std::move(session), *cell)));
   }
   DiagnoseOptions options;
   options.recovery = false;
   return test::demand(diagnose(cell, joined(batches), options));
+}
+
+/// Sessions of 50 poses, the tracker set up anew for each.
+Diagnosis diagnosis_of(const std::vector<VirtualRobot>& robots, std::uint64_t seed) {
+  std::vector<MeasurementBatch> sessions;
+  for (std::size_t s = 0; s < robots.size(); ++s)
+    sessions.push_back(
+        test::measured_on(robots[s], {.poses = 50, .seed = seed + 31 * s, .set_up_anew = s + 1 < robots.size()}));
+  return diagnosis_of(robots.front().truth.cell, std::move(sessions));
 }
 
 TEST(BetweenSessions, AZeroThatWasLostIsToldWithItsSessionAndIsNoNoise) {
@@ -126,6 +133,53 @@ TEST(BetweenSessions, AWarmArmWithoutAThermometerIsNoOtherToolForSure) {
   for (const std::uint64_t seed : {120, 121}) {
     const Diagnosis told = diagnosis_of({robot, grown(robot, 1.2e-4), robot}, seed);
     EXPECT_FALSE(is_sure(told)) << told.sentence;
+  }
+}
+
+/// 50 poses, every joint approached from that side, or from either by chance where it is 0; the tracker `turned` by so
+/// many rad, and moved.
+MeasurementBatch approached(const VirtualRobot& robot, int side, double turned, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::vector<PoseContext> poses;
+  for (const Measurement& m : test::measured_on(robot, {.poses = 50, .seed = seed}).measurements) {
+    poses.push_back(m.context);
+    poses.back().direction.clear();
+    for (int j = 0; j < robot.truth.cell->robot.size(); ++j)
+      poses.back().direction.push_back(side != 0 ? side : random() % 2 == 0 ? 1 : -1);
+  }
+  SimulateOptions options;
+  options.seed = seed;
+  MeasurementBatch batch = test::demand(simulate(robot, poses, options));
+  const Pose X = make_pose(rotation_exp(Vector3(0, 0, turned)), Vector3(0.2, -0.1, 0.3) * turned);
+  for (Measurement& m : batch.measurements) {
+    m.p_W = X * m.p_W;
+    m.R_WT = X.linear() * *m.R_WT;
+  }
+  return batch;
+}
+
+void expect_play(int joint, const std::vector<int>& sides, std::uint64_t seed) {
+  const VirtualRobot robot = with_source(test::chapter_5_robot(test::cell_7()), fmt::format("backlash:{}", joint),
+                                         {3e-4, from_rad_per_nmm(1e-10)});
+  std::vector<MeasurementBatch> sessions;
+  for (const int side : sides) {
+    const auto later = static_cast<double>(sides.size() - 1 - sessions.size());
+    sessions.push_back(approached(robot, side, 0.3 * later, seed + sessions.size()));
+  }
+  const Diagnosis told = diagnosis_of(robot.truth.cell, std::move(sessions));
+  const auto is_play = [&](const Cause& cause) { return cause.cause == "backlash" && cause.joint == joint - 1; };
+  EXPECT_TRUE(std::any_of(told.findings.begin(), told.findings.end(), [&](const Finding& one) {
+    return is_play(one.cause);
+  })) << told.sentence;
+  for (const Finding& one : told.findings) EXPECT_TRUE(is_play(one.cause)) << to_string(one.cause) << told.sentence;
+  EXPECT_TRUE(told.between_sessions.empty()) << told.sentence;
+  EXPECT_NE(told.noise_from.find("alone gives 22.5 um"), std::string::npos) << told.noise_from;
+}
+
+TEST(BetweenSessions, PlayIsPlayAndNoPayloadFromWhicheverSideEachDayCame) {
+  for (const std::uint64_t seed : {140, 150}) {
+    expect_play(2, {0, 0, 0}, seed);
+    expect_play(3, {1, -1, 1, -1}, seed);
   }
 }
 
