@@ -107,8 +107,11 @@ Result<PreparedBatch> prepare(const Cell& cell, const CheckedBatch& batch,
         .in("batch " + batch.id())
         .beyond(poses, kFewestPoses);
   }
-  prepared.train = std::move(merged.batch);
   prepared.repeats = merged.statistics;
+  prepared.vouched = vouched_by(merged.statistics);
+  prepared.train = std::move(merged.batch);
+  for (Measurement& m : prepared.train.measurements)
+    if (m.sigma) *m.sigma *= prepared.vouched / merged.statistics.sigma_factor;
   return prepared;
 }
 

@@ -100,6 +100,10 @@ inline constexpr double kAtOnce = 0.05;
 /// rad that no joint exceeds from pose to pose along a path that was measured in motion.
 inline constexpr double kPathStep = 0.2;
 
+/// m: positions of a tool that all lie in so small a box were measured at one point. An arm that is off its drawing by
+/// as much as arms are moves its tool by less.
+inline constexpr double kOnePoint = 0.02;
+
 // Doubting: what makes a finding unsure once everything was found.
 
 /// Share of the range of all other poses by which a pose must lie beyond them in a joint to stand at the edge.
@@ -144,6 +148,9 @@ inline constexpr double kSureOfSide = 12;
 
 // What is left, against what is stated for one measurement.
 
+/// Times the stated standard deviation up to which poses measured repeatedly say how noisy the measurement is. Where
+/// they scatter by more, something moved between them.
+inline constexpr double kRepeatsVouch = 3;
 /// Standard uncertainty of the stated standard deviation, as a share of it.
 inline constexpr double kSigmaKnownTo = 0.1;
 /// Standard uncertainties, of sigma and of chance together, beyond which what is left is not the measurement; of chance

@@ -148,7 +148,7 @@ MeasurementBatch approached(const VirtualRobot& robot, int side, double turned, 
       poses.back().direction.push_back(side != 0 ? side : random() % 2 == 0 ? 1 : -1);
   }
   SimulateOptions options;
-  options.seed = seed;
+  options.seed = 3 * seed + static_cast<std::uint64_t>(side + 1);
   MeasurementBatch batch = test::demand(simulate(robot, poses, options));
   const Pose X = make_pose(rotation_exp(Vector3(0, 0, turned)), Vector3(0.2, -0.1, 0.3) * turned);
   for (Measurement& m : batch.measurements) {
@@ -181,6 +181,27 @@ TEST(BetweenSessions, PlayIsPlayAndNoPayloadFromWhicheverSideEachDayCame) {
     expect_play(2, {0, 0, 0}, seed);
     expect_play(3, {1, -1, 1, -1}, seed);
   }
+}
+
+TEST(BetweenSessions, RepeatsThatScatterFarBeyondWhatIsStatedVouchForNoNoise) {
+  const VirtualRobot robot = with_source(test::chapter_5_robot(test::cell_7()), "backlash:2", {3e-4, 0});
+  std::vector<MeasurementBatch> sessions;
+  for (const std::uint64_t seed : {160, 161, 162}) {
+    // Every pose from either side, and nobody recorded which.
+    MeasurementBatch both = approached(robot, 1, 0, seed);
+    for (Measurement& m : approached(robot, -1, 0, seed).measurements) {
+      m.pose_id += "-";
+      both.measurements.push_back(std::move(m));
+    }
+    for (Measurement& m : both.measurements) m.context.direction.clear();
+    sessions.push_back(std::move(both));
+  }
+  const Diagnosis told = diagnosis_of(robot.truth.cell, std::move(sessions));
+  EXPECT_NE(told.verdict, Verdict::kNothing) << told.sentence;
+  EXPECT_FALSE(is_sure(told)) << told.sentence;
+  EXPECT_TRUE(told.unexplained.present);
+  EXPECT_NE(told.sentence.find("approached from different sides"), std::string::npos) << told.sentence;
+  EXPECT_NE(told.noise_from.find("alone gives 15.9 um"), std::string::npos) << told.noise_from << ": of two each";
 }
 
 TEST(BetweenSessions, ANoisySessionIsNotVouchedForByItself) {

@@ -3,9 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <random>
 
 #include "server/diagnose/diagnose.h"
 #include "server/plan/plan.h"
+#include "server/robot/inverse_kinematics.h"
 #include "server/simulate/simulate.h"
 #include "tests/support/demand.h"
 #include "tests/support/temporary_folder.h"
@@ -57,6 +59,57 @@ TEST(WholeList, ARailThatRunsOffItsDrawnDirectionIsLinkGeometry) {
     EXPECT_LT(found.after.rms, 70e-6) << found.sentence;
     EXPECT_EQ(found.sentence.find("no known cause"), std::string::npos) << found.sentence;
   }
+}
+
+/// A UR5 whose joint 5 is off by that much turns its tip about one place: 30 orientations.
+Diagnosis about_one_point(double zero) {
+  const test::TemporaryFolder folder;
+  const std::string text = fmt::format(
+      "version: 1\ncell: tip\nrobot: {}/models/universal-robots_ur5.yaml\nbase: null\n"
+      "tools: {{tip: {{xyz_mm: [40, 10, 160], q_wxyz: [1, 0, 0, 0]}}}}\n"
+      "tracker: {{sigma_mm: 0.02}}\nmodel: {{error_sources: [base], bias: none}}\n",
+      TRAMMEL_SOURCE_DIR);
+  const auto cell = std::make_shared<const Cell>(test::demand(read_cell(folder.write("cell.yaml", text))));
+  VirtualRobot robot{test::demand(make_physical_model(cell, {"joint_slip:5@1"})), 20e-6, 0, {}};
+  const Vector3 p_FT = robot.truth.tools.at("tip").translation();
+  robot.truth.values(0) = zero;
+  std::vector<PoseContext> poses;
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> turn(-0.6, 0.6);
+  const JointVector seed = (JointVector(6) << 0.6, -1.5, 1.4, -1.4, -1.6, 0.4).finished();
+  const Pose X_BF = cell->robot.flange_pose(seed);
+  const Vector3 tip = X_BF * p_FT;
+  while (poses.size() < 30) {
+    const Matrix3 R = rotation_exp(Vector3(turn(random), turn(random), 2 * turn(random))) * X_BF.linear();
+    const InverseResult found = inverse_kinematics(cell->robot, make_pose(R, tip - R * p_FT), seed);
+    if (found.status != InverseStatus::kOk) continue;
+    poses.emplace_back();
+    poses.back().q = found.q;
+  }
+  SimulateOptions options;
+  options.orientation = false;
+  const MeasurementBatch batch = test::demand(simulate(robot, poses, options));
+  DiagnoseOptions quick;
+  quick.draws = 200;
+  quick.recovery = false;
+  return test::demand(diagnose(cell, test::demand(check_against_cell(batch, *cell)), quick));
+}
+
+TEST(WholeList, AboutOnePointBaseToolAndZerosAreNotToldApartAndOtherPosesAreGiven) {
+  const Diagnosis told = about_one_point(0.014);
+  EXPECT_EQ(told.sentence.find("no known cause"), std::string::npos) << told.sentence;
+  EXPECT_EQ(told.verdict, Verdict::kAmbiguous) << told.sentence;
+  ASSERT_FALSE(told.findings.empty()) << told.sentence;
+  const Finding& one = told.findings.front();
+  EXPECT_EQ(one.cause.cause, "geometry");
+  for (const char* rival : {"base", "tool"})
+    EXPECT_NE(std::find(one.could_also_be.begin(), one.could_also_be.end(), Cause{rival}), one.could_also_be.end())
+        << rival;
+  EXPECT_NE(one.action.find("other places"), std::string::npos) << one.action;
+  EXPECT_FALSE(told.next_poses.q.empty()) << told.next_poses.none_because;
+  EXPECT_TRUE(std::any_of(told.limits.begin(), told.limits.end(), [](const std::string& limit) {
+    return limit.find("measured at one point") != std::string::npos;
+  }));
 }
 
 TEST(WholeList, AWristCouplingTooLargeForADerivativeIsFound) {

@@ -259,6 +259,12 @@ std::vector<FamilyPtr> make_families(const LinearProblem& problem) {
   return families.take();
 }
 
+bool has_cause(const PhysicalModel& model, const Cause& cause) {
+  return std::any_of(model.sources.begin(), model.sources.end(), [&](const ErrorSourcePtr& one) {
+    return one->cause().spelling == cause.cause && one->joint() == cause.joint;
+  });
+}
+
 Cause cause_of(const ErrorSource& source, const MeasurementBatch& batch) {
   Cause cause = cause_at(source.cause(), source.joint());
   if (source.cause().lasting != Lasting::kFromAPose) return cause;

@@ -19,6 +19,9 @@ namespace trammel::cause_search {
 /// and of time, and what moves slowly. `problem` was made with candidate_sources() and outlives them.
 [[nodiscard]] std::vector<FamilyPtr> make_families(const LinearProblem& problem);
 
+/// Whether the model has a source of that cause and joint.
+[[nodiscard]] bool has_cause(const PhysicalModel& model, const Cause& cause);
+
 /// The cause that a source in a model's list stands for.
 [[nodiscard]] Cause cause_of(const ErrorSource& source, const MeasurementBatch& batch);
 

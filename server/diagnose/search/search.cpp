@@ -403,6 +403,10 @@ bool Search::name_functions() {
   one.source = to_string(one.cause);
   one.in_model = name_in(result_.after.model, one.cause);
   one.could_also_be = std::move(instead->rivals);
+  for (const Cause& rival : untestable_rivals(one.cause, result_.batch)) {
+    auto& others = one.could_also_be;
+    if (std::find(others.begin(), others.end(), rival) == others.end()) others.push_back(rival);
+  }
   const Together now(result_);
   const OwnEstimate own = own_estimate(now.problem, one.in_model, now.change, now.covariance);
   one.best.freedom = static_cast<int>(own.size.size());

@@ -30,12 +30,6 @@ std::vector<Cause> causes_to_try(const SearchResult& result, bool of_joints) {
   return all;
 }
 
-bool is_in(const PhysicalModel& model, const Cause& cause) {
-  return std::any_of(model.sources.begin(), model.sources.end(), [&](const ErrorSourcePtr& one) {
-    return one->cause().spelling == cause.cause && one->joint() == cause.joint;
-  });
-}
-
 /// Whether positions leave more than noise.
 bool leaves_much(const SearchResult& result) {
   const LinearProblem problem(result.after.model, result.batch, result.after.priors, {});
@@ -48,7 +42,7 @@ std::vector<Trial> trials_of(const SearchResult& result, const std::vector<Cause
   for (const Cause& cause : causes_to_try(result, result.unnamed.empty())) {
     const bool tried = std::find(closed.begin(), closed.end(), cause) != closed.end();
     Trial trial{cause, result.after, 0};
-    if (tried || is_in(trial.model.model, cause) || !add_to(trial.model, to_string(cause))) continue;
+    if (tried || has_cause(trial.model.model, cause) || !add_to(trial.model, to_string(cause))) continue;
     refine(trial.model, result.batch, {});
     trial.square = held_out_square(trial.model, result.batch, {}, weight);
     trials.push_back(std::move(trial));

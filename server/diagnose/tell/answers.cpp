@@ -137,7 +137,7 @@ void tell_errors(const Explained& explained, const PreparedBatch& prepared, Diag
                       ? fmt::format("{} poses measured repeatedly scatter by {:.1f} um; ", prepared.repeats.groups,
                                     1e6 * std::sqrt(3.0) * prepared.repeats.sigma)
                       : "",
-                  1e6 * std::sqrt(3.0) * after.instrument());
+                  1e6 * std::sqrt(3.0) * after.instrument() / prepared.vouched);
   const LinearProblem& before = explained.before;
   const LinearProblem& served = explained.served;
   diagnosis.before = figures_of(before.positions(before.residual()));
@@ -309,6 +309,10 @@ void tell_limits(const Explained& explained, const PreparedBatch& prepared, cons
     limits.emplace_back(
         "the rows are not in the order of their times: they were put into it, and what begins at a pose is not "
         "applied");
+  if (sees_one_point(recorded))
+    limits.emplace_back(
+        "every tool was measured at one point: base, tool and the zeros of the last three joints cannot be told apart "
+        "there; measure poses all over the workspace");
   if (explained.found.too_many_outliers)
     limits.emplace_back("more than a tenth of the poses fit neither the model nor each other: measure again");
 }

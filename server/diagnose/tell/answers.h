@@ -17,6 +17,7 @@ namespace trammel::cause_search {
 struct PreparedBatch {
   MeasurementBatch train, validation;  ///< in the order of measuring; repeats of the one merged
   RepeatStatistics repeats;
+  double vouched = 1;                    ///< times the stated sigma: noise that the repeats vouch for; the rows have it
   Surrogates surrogates;                 ///< what was put in for what nobody recorded
   std::vector<SessionSetting> sessions;  ///< of several: with the noise of each that its repeated poses show
   bool sorted = false;                   ///< rows had to be moved into the order of their times

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "server/diagnose/search/naming.h"
+#include "server/diagnose/thresholds.h"
 #include "server/measurement/sessions.h"
 
 namespace trammel::cause_search {
@@ -14,8 +15,9 @@ using Eigen::Index;
 
 constexpr int kFewestRepeated = 12;  // degrees of freedom: a standard deviation is known to a fifth
 
-/// Of one axis: what repeats scatter by beyond what is stated.
+/// Of one axis: noise that repeats vouch for beyond what is stated.
 double beyond_stated(double repeated, double stated, int freedom) {
+  if (repeated > thresholds::kRepeatsVouch * stated) return 0;
   return freedom < kFewestRepeated ? 0 : std::sqrt(std::max(0.0, repeated * repeated - stated * stated));
 }
 

@@ -127,7 +127,7 @@ namespace {
 
 /// The reasons for which a cause is doubted.
 struct Doubts {
-  bool by_surrogate, dwarfed, again, unlikely, slow, by_scale, not_held_out, by_half;
+  bool by_surrogate, dwarfed, again, unlikely, slow, by_scale, not_held_out, by_half, at_one_point;
   std::vector<Cause> many;
 
   Doubts(const Cause& cause, const Evidence& evidence, const std::vector<Cause>& rivals, const Beside& beside)
@@ -139,6 +139,7 @@ struct Doubts {
         by_scale(may_be_scale(cause, beside)),
         not_held_out(!evidence.helps_held_out),
         by_half(beside.more_than_noise && !evidence.in_both_halves),
+        at_one_point(record_of(cause).part == causes::Part::kLinks && sees_one_point(beside.recorded)),
         many(descriptions_of_many(cause, beside.found)) {
     std::erase_if(many, [&](const Cause& general) { return contains(rivals, general); });
   }
@@ -174,6 +175,9 @@ std::string Doubts::action(const Cause& cause, const Surrogates& surrogates) con
   if (by_scale)
     return "it may be the scale of the instrument, which follows the temperature of the air: see that its weather "
            "station is right, and measure reference reflectors at known distances in between";
+  if (at_one_point)
+    return "measure poses at other places of the workspace, too: about one point base, tool and links make up for each "
+           "other";
   if (by_half)
     return "measure again with other poses: half of these do not show it by themselves, and more than noise is left";
   if (not_held_out) return "measure again with other poses: those that are held out are not predicted better with it";

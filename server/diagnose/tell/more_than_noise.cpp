@@ -48,15 +48,15 @@ std::string with_what_was_not_recorded(const Surrogates& unrecorded) {
   return all.empty() ? "" : fmt::format(", with {},", fmt::join(all, " and "));
 }
 
+/// Whether repeated poses scatter by more than they vouch for.
+bool scatter_beyond_noise(const RepeatStatistics& repeats) { return repeats.sigma_factor > thresholds::kRepeatsVouch; }
+
 /// What would show more, given what repeated poses say.
-std::string what_shows_more(const PreparedBatch& prepared, const LeftOver& position) {
+std::string what_shows_more(const PreparedBatch& prepared) {
   if (prepared.repeats.degrees_of_freedom == 0)
     return "measure some poses repeatedly, which tells a noisy measurement from something that the simulation "
            "lacks, and check the tracker's sigma in the cell file";
-  if (prepared.repeats.sigma > thresholds::kMoreThanNoise * position.stated)
-    return fmt::format(
-        "poses measured repeatedly scatter by {} an axis as well: the measurement is noisier than the cell file says",
-        micrometres(prepared.repeats.sigma));
+  if (scatter_beyond_noise(prepared.repeats)) return "find first what moves between poses measured repeatedly";
   return fmt::format(
       "poses measured repeatedly scatter by {} an axis only: the simulation lacks something that more poses{} may show",
       micrometres(prepared.repeats.sigma), with_what_was_not_recorded(prepared.surrogates));
@@ -83,6 +83,28 @@ double rms_beyond(const LeftOver& left) {
   return std::sqrt(3 * std::max(0.0, left.left * left.left - left.stated * left.stated));
 }
 
+/// What repeated poses show that is no noise.
+void tell_scatter(const PreparedBatch& prepared, Diagnosis& diagnosis) {
+  const RepeatStatistics& repeats = prepared.repeats;
+  if (!scatter_beyond_noise(repeats)) return;
+  const std::string hint = fmt::format(
+      "poses measured repeatedly scatter by {} an axis, {:.0f} times the stated noise: that is no noise of the "
+      "instrument; {}",
+      micrometres(repeats.sigma), repeats.sigma_factor,
+      prepared.surrogates.direction
+          ? "were they approached from different sides (record dir columns), or did something "
+            "move between them?"
+          : "did something move between them?");
+  Unexplained& unexplained = diagnosis.unexplained;
+  if (unexplained.present) {
+    diagnosis.limits.push_back(hint);
+    return;
+  }
+  const LeftOver scatter{repeats.sigma, repeats.sigma / repeats.sigma_factor,
+                         static_cast<double>(repeats.degrees_of_freedom)};
+  unexplained = {true, {}, rms_beyond(scatter), chance_of_noise(scatter), as_sentence(hint)};
+}
+
 bool is_worse_held_out(const PreparedBatch& prepared, const Diagnosis& diagnosis) {
   if (!diagnosis.held_out_before || !diagnosis.held_out_after) return false;
   const std::size_t rows = prepared.validation.measurements.size();
@@ -105,13 +127,14 @@ double chance_of_noise(const LeftOver& left) {
   return std::max(kLeastPValue, 0.5 * std::erfc(deviations(left) / std::sqrt(2.0)));
 }
 
+double vouched_by(const RepeatStatistics& repeats) { return scatter_beyond_noise(repeats) ? 1 : repeats.sigma_factor; }
+
 bool leaves_more_than_noise(const Explained& explained, const PreparedBatch& prepared) {
   const LinearProblem& after = explained.after;
-  const RepeatStatistics& repeats = prepared.repeats;
-  const LeftOver position = left_of(after.position_spread());
-  const bool measured = repeats.degrees_of_freedom > 0 && repeats.sigma > thresholds::kMoreThanNoise * position.stated;
-  const NoiseVerdict worst = std::max(judge_noise(position), judge_noise(left_of(after.rotation_spread())));
-  return !measured && (worst == NoiseVerdict::kMoreThanNoise || !sessions_beyond_noise(explained, prepared).empty());
+  const NoiseVerdict worst =
+      std::max(judge_noise(left_of(after.position_spread())), judge_noise(left_of(after.rotation_spread())));
+  return worst == NoiseVerdict::kMoreThanNoise || scatter_beyond_noise(prepared.repeats) ||
+         !sessions_beyond_noise(explained, prepared).empty();
 }
 
 Remainder remainder_of(const Explained& explained, const PreparedBatch& prepared, const Diagnosis& diagnosis) {
@@ -124,9 +147,10 @@ void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagn
   const LeftOver position = diagnosis.left_position = left_of(explained.after.position_spread());
   const LeftOver rotation = diagnosis.left_rotation = left_of(explained.after.rotation_spread());
   const std::vector<LeftBySession> beyond = sessions_beyond_noise(explained, prepared);
+  tell_scatter(prepared, diagnosis);
   const NoiseVerdict worst = std::max(judge_noise(position), judge_noise(rotation));
   if (worst == NoiseVerdict::kAsStated && beyond.empty()) return;
-  const std::string more = what_shows_more(prepared, position);
+  const std::string more = what_shows_more(prepared);
   if (worst != NoiseVerdict::kMoreThanNoise && beyond.empty()) {
     diagnosis.limits.push_back(fmt::format("a little more than noise: what is left is {}; {}",
                                            figures(position, rotation, NoiseVerdict::kLarger), more));

@@ -22,8 +22,12 @@ enum class NoiseVerdict {
 /// Chance of as much or more; not below 1e-6.
 [[nodiscard]] double chance_of_noise(const LeftOver& left);
 
-/// Whether what the extended model leaves, of all poses or of one session, is more than noise, and not that of the
-/// measurement: poses measured repeatedly do not scatter as much.
+/// Times the stated sigma: noise of the measurement that repeated poses vouch for. Where they scatter by more than
+/// measurements do, something moved between them, and they vouch for nothing.
+[[nodiscard]] double vouched_by(const RepeatStatistics& repeats);
+
+/// Whether what the extended model leaves, of all poses or of one session, is more than noise, or repeated poses
+/// scatter by more.
 [[nodiscard]] bool leaves_more_than_noise(const Explained& explained, const PreparedBatch& prepared);
 
 /// What is left beside all that has a name. It is more than noise where

@@ -264,12 +264,14 @@ NextPoses next_poses_for(const SearchResult& found, const LinearProblem& before,
   const std::vector<FamilyPtr> families = make_families(before);
   const Background background(background_columns(before, {}));
   std::vector<Member> members;
+  bool free = false;  // a rival is among the model's own numbers
   for (const Cause& rival : finding->could_also_be) {
     const std::optional<Member> member = member_of(before, families, background, rival);
     if (member) members.push_back(*member);
+    free = free || has_cause(before.model(), rival);
   }
   const std::optional<Member> itself = member_of(before, families, background, finding->cause);
-  if (members.empty() || !itself) return {};
+  if ((members.empty() && !free) || !itself) return {};
   members.push_back(*itself);
   const Doubted doubt = doubted(before, members);
   Measuring measuring(found, members, doubt.columns.cols(), options.seed);
