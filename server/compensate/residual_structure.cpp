@@ -46,16 +46,18 @@ VectorXd along_joint(const CompensatedModel& model, const MeasurementBatch& batc
   for (Index i = 0; i < along.size(); ++i) {
     const PoseContext& context = batch.measurements[static_cast<std::size_t>(i)].context;
     const Vector3 p_FT = served_tool(model.parts().physics, context.tool).translation();
-    const Vector3 way = robot.jacobian(context.q, p_FT).col(joint).head<3>();
+    const Vector3 way = robot.gear_jacobian(context.q, p_FT).col(joint).head<3>();
     along(i) = way.norm() > 0 ? residual_B.col(i).dot(way.normalized()) : 0;
   }
   return along;
 }
 
-ResidualOrder order_of_joint(const MeasurementBatch& batch, const VectorXd& along, int joint) {
+ResidualOrder order_of_joint(const Chain& robot, const MeasurementBatch& batch, const VectorXd& along, int joint) {
   std::vector<Index> sorted(static_cast<std::size_t>(along.size()));
   std::iota(sorted.begin(), sorted.end(), Index{0});
-  const auto angle = [&](Index i) { return batch.measurements[static_cast<std::size_t>(i)].context.q(joint); };
+  const auto angle = [&](Index i) {
+    return robot.gear_angles(batch.measurements[static_cast<std::size_t>(i)].context.q)(joint);
+  };
   std::stable_sort(sorted.begin(), sorted.end(), [&](Index a, Index b) { return angle(a) < angle(b); });
   ResidualOrder order;
   order.joint = joint;
@@ -76,7 +78,7 @@ std::vector<ResidualOrder> residual_orders(const CompensatedModel& model, const 
   const Chain& robot = model.cell().robot;
   for (int joint = 0; joint < robot.size(); ++joint) {
     if (robot.joint(joint).type == JointType::kRevolute)
-      orders.push_back(order_of_joint(batch, along_joint(model, batch, residual_B, joint), joint));
+      orders.push_back(order_of_joint(robot, batch, along_joint(model, batch, residual_B, joint), joint));
   }
   return orders;
 }

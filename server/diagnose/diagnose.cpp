@@ -96,7 +96,7 @@ Result<PreparedBatch> prepare(const Cell& cell, const CheckedBatch& batch,
   MeasurementBatch all = in_one_world(ordered.rows());
   MergedRepeats merged = merge_repeats(in_one_world(ordered.training()), cell.tracker.sigma);
   prepared.validation = in_one_world(ordered.held_out());
-  prepared.surrogates = put_in_surrogates(all);
+  prepared.surrogates = put_in_surrogates(all, cell.robot);
   take_over_surrogates(prepared.surrogates, all, merged.batch);
   take_over_surrogates(prepared.surrogates, all, prepared.validation);
   const std::size_t poses = merged.batch.measurements.size();

@@ -49,7 +49,7 @@ class AxisWobble final : public ErrorSource {
 
   void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
              StateJacobian* jacobian, int first_column) const override {
-    const double q = state.chain->transmission().row(joint_) * context.q;
+    const double q = state.chain->drive().row(joint_) * context.q;
     move_axis(joint_, rates_at(q), values, state, jacobian, first_column);
   }
 

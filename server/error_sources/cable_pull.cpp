@@ -25,7 +25,9 @@ struct Range {
 class CablePull final : public ErrorSource {
  public:
   CablePull(const SourceSpec& spec, int other, const Chain& chain)
-      : name_(spec.text), joint_(spec.joint), other_(other), turns_(chain.transmission()) {
+      : name_(spec.text), joint_(spec.joint), other_(other) {
+    sum_ = chain.drive().row(joint_) + chain.drive().row(other_);
+    pulled_ = chain.bars().row(joint_) + chain.bars().row(other_);
     range_ = range_of(chain);
     double reach = 0;
     for (int i = 0; i < chain.size(); ++i) reach += std::hypot(chain.joint(i).link.d, chain.joint(i).link.a);
@@ -45,10 +47,11 @@ class CablePull final : public ErrorSource {
   void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
              StateJacobian* jacobian, int first_column) const override {
     if (state.spring_torque.size() == 0) state.spring_torque = JointArray::Zero(state.chain->size());
-    const std::array<double, kDegrees> polynomials = polynomials_at(sum_of(context.q));
+    const std::array<double, kDegrees> polynomials = polynomials_at(sum_.dot(context.q));
     for (int k = 0; k < kDegrees; ++k) {
-      const double rate = polynomials[static_cast<std::size_t>(k)];
-      for (const int joint : {joint_, other_}) {
+      for (int joint = 0; joint < state.chain->size(); ++joint) {
+        const double rate = pulled_(joint) * polynomials[static_cast<std::size_t>(k)];
+        if (rate == 0) continue;
         state.spring_torque(joint) += rate * values(k);
         if (jacobian != nullptr) jacobian->add(jacobian->rows.spring(joint), first_column + k, rate);
       }
@@ -56,14 +59,11 @@ class CablePull final : public ErrorSource {
   }
 
  private:
-  /// Of the axes themselves, through signs and couplings.
-  double sum_of(const JointVector& q) const { return (turns_.row(joint_) + turns_.row(other_)).dot(q); }
-
   Range range_of(const Chain& chain) const {
     Range sum;
     for (int k = 0; k < chain.size(); ++k) {
       const Joint& joint = chain.joint(k);
-      const double rate = turns_(joint_, k) + turns_(other_, k);
+      const double rate = chain.transmission()(joint_, k) + chain.transmission()(other_, k);
       if (rate == 0) continue;
       const double ends[] = {rate * (std::isfinite(joint.lower) ? joint.lower : -kPi),
                              rate * (std::isfinite(joint.upper) ? joint.upper : kPi)};
@@ -85,7 +85,8 @@ class CablePull final : public ErrorSource {
   std::string name_;
   int joint_;
   int other_;
-  Eigen::MatrixXd turns_;
+  Eigen::RowVectorXd sum_;     ///< of both axes, by the angle of each gear
+  Eigen::RowVectorXd pulled_;  ///< how much of the torque about both axes loads each gear
   Range range_;
   std::vector<Parameter> parameters_;
 };

@@ -11,9 +11,9 @@ namespace {
 constexpr int kMaxEquilibriumSteps = 50;
 constexpr double kEquilibriumStep = 1e-13;  // rad
 
-/// Every gearbox deflects in proportion to the gravity torque on it. A weight acts at its centre of gravity (the
-/// physical wrench). There are three forms of eq. (3.6), dx = J C Jᵀ F. They differ by the square of the deflection: 50
-/// um at a deflection of 6 mrad.
+/// Every gearbox deflects in proportion to the gravity torque on it, and takes along what bars couple to it. A weight
+/// acts at its centre of gravity (the physical wrench). There are three forms of eq. (3.6), dx = J C Jᵀ F. They differ
+/// by the square of the deflection: 50 um at a deflection of 6 mrad.
 class Compliance : public ErrorSource {
  public:
   explicit Compliance(const Chain& chain) {
@@ -27,6 +27,8 @@ class Compliance : public ErrorSource {
   std::string explanation() const override { return "the gearboxes give way under the weight of the payload"; }
 
  protected:
+  using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxJoints, kMaxJoints>;
+
   /// State rows of all joints.
   static std::vector<int> joint_rows(const Chain& chain) {
     const StateRows rows(chain.size());
@@ -35,7 +37,18 @@ class Compliance : public ErrorSource {
     return all;
   }
 
-  static void deflect(ArmState& state, const JointArray& deflection) {
+  /// Records how the joints move with each compliance: a row of `by_C` for each of `rows`.
+  static void add_by_C(const Square& by_C, const std::vector<int>& rows, int first_column, StateJacobian& jacobian) {
+    for (Eigen::Index j = 0; j < by_C.cols(); ++j) {
+      for (Eigen::Index i = 0; i < by_C.rows(); ++i) {
+        const auto row = rows[static_cast<std::size_t>(i)];
+        if (by_C(i, j) != 0) jacobian.add(row, first_column + static_cast<int>(j), by_C(i, j));
+      }
+    }
+  }
+
+  static void deflect(ArmState& state, const JointArray& of_gears) {
+    const JointArray deflection = state.chain->bars() * of_gears;
     for (int j = 0; j < state.chain->size(); ++j) {
       LinkGeometry& link = state.links[static_cast<std::size_t>(j)];
       (state.chain->joint(j).type == JointType::kRevolute ? link.theta : link.d) += deflection(j);
@@ -58,10 +71,9 @@ class ComplianceFirstOrder final : public Compliance {
     const JointArray torque = kinematics.gravity_torque();
     if (jacobian != nullptr) {
       const std::vector<int> rows = joint_rows(*state.chain);
-      jacobian->pass_on(rows, C.asDiagonal() * kinematics.gravity_torque_jacobian());
-      for (int j = 0; j < state.chain->size(); ++j) {
-        jacobian->add(rows[static_cast<std::size_t>(j)], first_column + j, torque(j));
-      }
+      const Square bars = state.chain->bars();
+      jacobian->pass_on(rows, bars * C.asDiagonal() * kinematics.gravity_torque_jacobian());
+      add_by_C(bars * torque.asDiagonal(), rows, first_column, *jacobian);
     }
     deflect(state, C.cwiseProduct(torque));
   }
@@ -86,22 +98,20 @@ class ComplianceEquilibrium final : public Compliance {
       if (moved < kEquilibriumStep) break;
     }
     if (jacobian == nullptr) return;
-    // dq = C tau + C T (dq + ds): (I - C T_q) dq = tau dC + C T_s ds, T the torque's derivative in the loaded posture.
+    // Of the gears: dg = C tau + C T (dq + ds), dq = B dg: (I - C T_q B) dg = tau dC + C T_s ds, T the torque's
+    // derivative in the loaded posture, B the bars.
     const ArmKinematics loaded(state);
     const JointArray torque = loaded.gravity_torque();
     const JointStateMatrix T = loaded.gravity_torque_jacobian();
     const int n = state.chain->size();
     const std::vector<int> rows = joint_rows(*state.chain);
-    using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxJoints, kMaxJoints>;
-    Square balance = Square::Identity(n, n);
-    for (int j = 0; j < n; ++j) balance.col(j) -= C.cwiseProduct(T.col(rows[static_cast<std::size_t>(j)]));
-    const Square inverse = balance.partialPivLu().inverse();
+    Square by_joints(n, n);
+    for (int j = 0; j < n; ++j) by_joints.col(j) = C.cwiseProduct(T.col(rows[static_cast<std::size_t>(j)]));
+    const Square bars = state.chain->bars();
+    const Square balance = Square::Identity(n, n) - by_joints * bars;
+    const Square inverse = bars * balance.partialPivLu().inverse();
     jacobian->pass_on(rows, inverse * C.asDiagonal() * T);
-    for (int j = 0; j < n; ++j) {
-      for (int i = 0; i < n; ++i) {
-        jacobian->add(rows[static_cast<std::size_t>(i)], first_column + j, inverse(i, j) * torque(j));
-      }
-    }
+    add_by_C(inverse * torque.asDiagonal(), rows, first_column, *jacobian);
   }
 };
 
@@ -115,10 +125,10 @@ class ComplianceLinear final : public Compliance {
              int first_column) const override {
     const ArmKinematics kinematics(state);
     const JointArray torque = kinematics.gravity_torque();
-    const ArmKinematics::DeflectionJacobian J = kinematics.deflection_jacobian();
+    const ArmKinematics::JointJacobian J = kinematics.deflection_jacobian();
     const JointArray deflection = C.cwiseProduct(torque);
     if (jacobian != nullptr) {
-      const ArmKinematics::DeflectionJacobian by_torque = J * C.asDiagonal();
+      const ArmKinematics::JointJacobian by_torque = J * C.asDiagonal();
       const JointStateMatrix T = kinematics.gravity_torque_jacobian();
       Eigen::MatrixXd by_state = kinematics.deflection_jacobian_derivative(deflection);
       for (int row = 0; row < T.cols(); ++row) by_state.col(row) += by_torque.lazyProduct(T.col(row));

@@ -47,7 +47,8 @@ class ErrorSource {
   [[nodiscard]] virtual std::string explanation() const = 0;
   /// Changes `state` as the cause does at this pose, with `values` (SI) for its parameters. Where `jacobian` is given,
   /// its columns first_column... receive the exact derivative, and sources that depend on the state pass the
-  /// derivatives of earlier sources on.
+  /// derivatives of earlier sources on. The joints of `context` are the angles of their gears (Chain::gear_angles), not
+  /// what a controller with couplings counts.
   virtual void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
                      StateJacobian* jacobian, int first_column) const = 0;
 };

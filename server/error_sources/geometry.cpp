@@ -13,7 +13,7 @@ class Geometry final : public ErrorSource {
     for (int i = 0; i < chain.size(); ++i) {
       const auto add = [&](double LinkGeometry::*member, int row, const char* symbol, bool length) {
         const std::string name = fmt::format("{}{}", symbol, i + 1);
-        entries_.push_back({static_cast<std::size_t>(i), member, row});
+        entries_.push_back({i, member, row});
         parameters_.push_back(length ? length_parameter(name, 2) : angle_parameter(name, 5e-3));
       };
       const StateRows rows(chain.size());
@@ -34,15 +34,28 @@ class Geometry final : public ErrorSource {
   void apply(const PoseContext&, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
              StateJacobian* jacobian, int first_column) const override {
     for (std::size_t k = 0; k < entries_.size(); ++k) {
-      const auto column = static_cast<Eigen::Index>(k);
-      state.links[entries_[k].link].*entries_[k].member += values(column);
-      if (jacobian != nullptr) jacobian->add(entries_[k].row, first_column + static_cast<int>(k), 1);
+      const Entry& entry = entries_[k];
+      const double value = values(static_cast<Eigen::Index>(k));
+      const int column = first_column + static_cast<int>(k);
+      if (entry.row == StateRows(state.chain->size()).of_joint(*state.chain, entry.link)) {
+        add_to_zero(entry.link, value, state, jacobian, column);
+      } else {
+        state.links[static_cast<std::size_t>(entry.link)].*entry.member += value;
+        if (jacobian != nullptr) jacobian->add(entry.row, column, 1);
+      }
     }
   }
 
  private:
+  /// A zero is its gear's, counted as the axis turns: what bars couple goes with it.
+  static void add_to_zero(int joint, double value, ArmState& state, StateJacobian* jacobian, int column) {
+    const double sign = state.chain->joint(joint).sign;
+    state.add_to_joint(joint, sign * value);
+    if (jacobian != nullptr) jacobian->add_to_joint(joint, column, sign);
+  }
+
   struct Entry {
-    std::size_t link;
+    int link;
     double LinkGeometry::*member;
     int row;
   };

@@ -6,6 +6,31 @@
 
 namespace trammel {
 
+namespace {
+
+/// The pose as its causes see it: with the angles of the gears, where the controller counts others. What was recorded
+/// of approach directions is of the gears already.
+class AtTheGears {
+ public:
+  AtTheGears(const Chain& robot, const PoseContext& context) : context_(&context) {
+    if (robot.counts_gears()) return;
+    PoseContext& own = own_.emplace(context);
+    own.q = robot.gear_angles(context.q);
+    if (context.velocity) own.velocity = robot.gear_angles(*context.velocity);
+    if (context.before) own.before = robot.gear_angles(*context.before);
+    context_ = &own;
+  }
+  AtTheGears(const AtTheGears&) = delete;
+  AtTheGears& operator=(const AtTheGears&) = delete;
+  const PoseContext& operator*() const { return *context_; }
+
+ private:
+  std::optional<PoseContext> own_;
+  const PoseContext* context_;
+};
+
+}  // namespace
+
 int PhysicalModel::parameter_count() const {
   int count = 0;
   for (const ErrorSourcePtr& source : sources) count += static_cast<int>(source->parameters().size());
@@ -50,10 +75,11 @@ Pose PhysicalModel::nominal_pose_W(const PoseContext& context) const {
 
 ArmState PhysicalModel::state(const PoseContext& context) const {
   ArmState state = nominal_state(context);
+  const AtTheGears seen(cell->robot, context);
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : sources) {
     const auto count = static_cast<Eigen::Index>(source->parameters().size());
-    source->apply(context, values.segment(first, count), state, nullptr, 0);
+    source->apply(*seen, values.segment(first, count), state, nullptr, 0);
     first += count;
   }
   return state;
@@ -67,10 +93,11 @@ Pose PhysicalModel::pose_W(const PoseContext& context, const Eigen::VectorXd& pa
   ArmState state = nominal_state(context);
   std::optional<StateJacobian> by_parameters;
   if (jacobian != nullptr) by_parameters.emplace(cell->robot, static_cast<int>(parameter_values.size()));
+  const AtTheGears seen(cell->robot, context);
   Eigen::Index first = 0;
   for (const ErrorSourcePtr& source : sources) {
     const auto count = static_cast<Eigen::Index>(source->parameters().size());
-    source->apply(context, parameter_values.segment(first, count), state, by_parameters ? &*by_parameters : nullptr,
+    source->apply(*seen, parameter_values.segment(first, count), state, by_parameters ? &*by_parameters : nullptr,
                   static_cast<int>(first));
     first += count;
   }

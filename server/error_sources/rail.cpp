@@ -104,7 +104,7 @@ class RailStraightness final : public ErrorSource {
 
   void apply(const PoseContext& context, const Eigen::Ref<const Eigen::VectorXd>& values, ArmState& state,
              StateJacobian* jacobian, int first_column) const override {
-    const double q = state.chain->transmission().row(joint_) * context.q;
+    const double q = state.chain->drive().row(joint_) * context.q;
     const double place = state.chain->joint(joint_).link.d + q;
     move_axis(joint_, rates_at(q, place), values, state, jacobian, first_column);
     const StateRows rows(state.chain->size());

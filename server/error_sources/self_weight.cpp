@@ -22,7 +22,7 @@ bool is_felt(const Cell& cell, int i) {
   arm.chain = &chain;
   arm.links = chain.links_at(JointVector::Zero(chain.size()));
   arm.X_WB = *cell.X_WB;
-  const Vector3 axis = ArmKinematics(arm).deflection_jacobian().col(i).tail<3>();
+  const Vector3 axis = ArmKinematics(arm).axis_jacobian().col(i).tail<3>();
   return std::abs(axis.dot(cell.gravity_W)) < kVertical;
 }
 

@@ -18,12 +18,22 @@ constexpr double kGrid = 1e-4;               // deg, mm: the four decimals of pr
 
 double longest_way(const Joint& joint) { return joint.type == JointType::kRevolute ? kBumpAngle : kBumpLength; }
 
-/// Where the joint starts to come to `q` from this side; nothing where it has too little way.
-std::optional<double> start_of(const Joint& joint, double q, int side) {
-  TRAMMEL_CHECK(side == 1 || side == -1);
-  const double start = std::clamp(q - side * longest_way(joint), joint.lower, joint.upper);
-  if (std::abs(start - q) < kLeastBump * longest_way(joint)) return std::nullopt;
+/// Where the arm starts to come to `q` with its gears turning as `sides` say, kept within the limits.
+JointVector start_of(const Chain& robot, const JointVector& q, const Sides& sides) {
+  JointVector way(robot.size());
+  for (int j = 0; j < robot.size(); ++j) {
+    const int side = sides[static_cast<std::size_t>(j)];
+    TRAMMEL_CHECK(side == 1 || side == -1);
+    way(j) = side * longest_way(robot.joint(j));
+  }
+  JointVector start = q - robot.commanded(way);
+  for (int j = 0; j < robot.size(); ++j) start(j) = std::clamp(start(j), robot.joint(j).lower, robot.joint(j).upper);
   return start;
+}
+
+/// Whether the gear of the joint has way enough from `start` to `q` to take up its play on this side.
+bool has_way(const Chain& robot, const JointVector& q, const JointVector& start, int joint, int side) {
+  return side * robot.gear_angles(q - start)(joint) >= kLeastBump * longest_way(robot.joint(joint));
 }
 
 }  // namespace
@@ -39,18 +49,15 @@ Sides planned_sides(const Chain& robot, int number) {
 Sides possible_sides(const Chain& robot, const JointVector& q, Sides wanted) {
   for (int j = 0; j < robot.size(); ++j) {
     int& side = wanted[static_cast<std::size_t>(j)];
-    if (!start_of(robot.joint(j), q(j), side)) side = -side;
+    if (!has_way(robot, q, start_of(robot, q, wanted), j, side)) side = -side;
   }
   return wanted;
 }
 
 std::optional<JointVector> bump_pose(const Chain& robot, const JointVector& q, const Sides& sides) {
-  JointVector bump = q;
-  for (int j = 0; j < robot.size(); ++j) {
-    const auto start = start_of(robot.joint(j), q(j), sides[static_cast<std::size_t>(j)]);
-    if (!start) return std::nullopt;
-    bump(j) = *start;
-  }
+  JointVector bump = start_of(robot, q, sides);
+  for (int j = 0; j < robot.size(); ++j)
+    if (!has_way(robot, q, bump, j, sides[static_cast<std::size_t>(j)])) return std::nullopt;
   return bump;
 }
 

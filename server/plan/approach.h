@@ -9,7 +9,7 @@
 /// How a measuring pose is approached, so that it is known from which side play in the gears is taken up.
 namespace trammel {
 
-/// How each joint moves into a pose: +1 rising, -1 falling (PoseContext::direction).
+/// How each gear turns into a pose: +1 rising, -1 falling (PoseContext::direction).
 using Sides = std::vector<int>;
 
 /// The sides from which pose `number` (from 0) of a plan is approached: all from above first, then all from below. An
@@ -20,9 +20,9 @@ using Sides = std::vector<int>;
 /// `wanted`, with the other side for each joint that a limit leaves no way of the wanted one.
 [[nodiscard]] Sides possible_sides(const Chain& robot, const JointVector& q, Sides wanted);
 
-/// The pose from which `q` (rad, m) is approached slowly with every joint moving as `sides` say: the "bump"
-/// of source section 3.2.4.2, q - side * 5 deg (50 mm of a rail), kept within the limits. Nothing where a limit
-/// leaves a joint less than 1 deg (10 mm) to move: too little to take up the play.
+/// The pose from which `q` (rad, m) is approached slowly with every gear turning as `sides` say: the "bump" of
+/// source section 3.2.4.2, q - side * 5 deg (50 mm of a rail) where the controller counts the gears, kept within the
+/// limits. Nothing where a limit leaves a gear less than 1 deg (10 mm) to move: too little to take up the play.
 [[nodiscard]] std::optional<JointVector> bump_pose(const Chain& robot, const JointVector& q, const Sides& sides);
 
 /// The part of [lower, upper] (rad, m) in which this joint can be approached from either side, also after rounding to

@@ -38,9 +38,12 @@ class Arm {
   }
   /// Nominal tool position, m, in B.
   [[nodiscard]] Vector3 p_B(Eigen::Index pose) const { return cell_.robot.flange_pose(context(pose).q) * p_FT(pose); }
+  [[nodiscard]] double gear_angle(Eigen::Index pose, int joint) const {
+    return cell_.robot.gear_angles(context(pose).q)(joint);
+  }
   /// How the joint moves the tool, m/rad (m/m), in B.
   [[nodiscard]] Vector3 lever_B(Eigen::Index pose, int joint) const {
-    return cell_.robot.jacobian(context(pose).q, p_FT(pose)).col(joint).head<3>();
+    return cell_.robot.gear_jacobian(context(pose).q, p_FT(pose)).col(joint).head<3>();
   }
   /// The poses at which the joint moves the tool far enough, and by how much in which direction.
   struct Levers {
@@ -155,7 +158,7 @@ ordered_json fold(const Diagnosis& diagnosis, const Arm& arm, int joint, const W
   const Arm::Levers levers = arm.levers(joint);
   for (std::size_t k = 0; k < levers.poses.size(); ++k) {
     const Eigen::Index i = levers.poses[k];
-    const double angle = wave.order * arm.context(i).q(joint);
+    const double angle = wave.order * arm.gear_angle(i, joint);
     const double left = levers.unit_B[k].dot(diagnosis.residual_after_B.col(i)) / levers.length[k];
     phase.push_back(rounded(to_deg(angle - 2 * kPi * std::floor(angle / (2 * kPi))), 0.1));
     alone.push_back(rounded(to_urad(left + wave.at(angle)), 0.1));

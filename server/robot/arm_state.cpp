@@ -11,7 +11,7 @@ namespace trammel {
 void ArmState::add_to_joint(int joint, double delta) {
   for (int i = 0; i < chain->size(); ++i) {
     LinkGeometry& link = links[static_cast<std::size_t>(i)];
-    (chain->joint(i).type == JointType::kRevolute ? link.theta : link.d) += chain->transmission()(i, joint) * delta;
+    (chain->joint(i).type == JointType::kRevolute ? link.theta : link.d) += chain->drive()(i, joint) * delta;
   }
 }
 
@@ -33,7 +33,7 @@ void StateJacobian::add_block(int first_row, int first_column, const Eigen::Ref<
 
 void StateJacobian::add_to_joint(int joint, int column, double rate) {
   for (int i = 0; i < chain_->size(); ++i) {
-    const double share = chain_->transmission()(i, joint);
+    const double share = chain_->drive()(i, joint);
     if (share != 0) add(rows.of_joint(*chain_, i), column, share * rate);
   }
 }
@@ -46,7 +46,7 @@ void StateJacobian::pass_on(std::vector<int> into, Eigen::MatrixXd by_state) {
 void StateJacobian::pass_on_to_joint(int joint, const Eigen::RowVectorXd& by_state) {
   std::vector<int> into;
   for (int i = 0; i < chain_->size(); ++i) into.push_back(rows.of_joint(*chain_, i));
-  pass_on(std::move(into), chain_->transmission().col(joint) * by_state);
+  pass_on(std::move(into), chain_->drive().col(joint) * by_state);
 }
 
 void StateJacobian::transform(int first_row, const Eigen::Ref<const Eigen::MatrixXd>& factor) {
@@ -181,8 +181,13 @@ StateMatrix<6> ArmKinematics::pose_jacobian() const {
   return J;
 }
 
-ArmKinematics::DeflectionJacobian ArmKinematics::deflection_jacobian() const {
-  DeflectionJacobian J = DeflectionJacobian::Zero(6, chain_->size());
+ArmKinematics::JointJacobian ArmKinematics::deflection_jacobian() const {
+  if (!chain_->has_bars()) return axis_jacobian();
+  return axis_jacobian() * chain_->bars();
+}
+
+ArmKinematics::JointJacobian ArmKinematics::axis_jacobian() const {
+  JointJacobian J = JointJacobian::Zero(6, chain_->size());
   for (int j = 0; j < chain_->size(); ++j) {
     const Link& link = links_[static_cast<std::size_t>(j)];
     if (chain_->joint(j).type == JointType::kRevolute) {
@@ -195,9 +200,10 @@ ArmKinematics::DeflectionJacobian ArmKinematics::deflection_jacobian() const {
   return J;
 }
 
-StateMatrix<6> ArmKinematics::deflection_jacobian_derivative(const JointArray& deflection) const {
+StateMatrix<6> ArmKinematics::deflection_jacobian_derivative(const JointArray& of_gears) const {
   const StateRows rows(chain_->size());
-  const DeflectionJacobian J = deflection_jacobian();
+  const JointArray deflection = chain_->has_bars() ? JointArray(chain_->bars() * of_gears) : of_gears;
+  const JointJacobian J = axis_jacobian();
   const LinkVectors velocity = velocities_of(kinematic_tip_W_);
   const LinkVectors turn = turns();
   StateMatrix<6> D = StateMatrix<6>::Zero(6, rows.size());
@@ -244,6 +250,7 @@ JointArray ArmKinematics::gravity_torque() const {
         torque(j) += links_[static_cast<std::size_t>(j)].z.dot(turning);
     }
   }
+  if (chain_->has_bars()) torque = (chain_->bars().transpose() * torque).eval();
   if (spring_torque_.size() > 0) torque += spring_torque_;
   return torque;
 }
@@ -273,6 +280,8 @@ JointStateMatrix ArmKinematics::gravity_torque_jacobian() const {
     }
   }
   add_first_moments(turn, T);
+  if (chain_->has_bars()) T = (chain_->bars().transpose() * T).eval();
+  for (int j = 0; j < spring_torque_.size(); ++j) T(j, rows.spring(j)) = 1;
   return T;
 }
 
@@ -295,7 +304,6 @@ void ArmKinematics::add_first_moments(const LinkVectors& turn, JointStateMatrix&
       T(j, rows.first_moment(i, 1)) += by_moment.dot(first.y);
     }
   }
-  for (int j = 0; j < spring_torque_.size(); ++j) T(j, rows.spring(j)) = 1;
 }
 
 Vector3 ArmKinematics::base_moment() const {

@@ -31,9 +31,9 @@ struct ArmState {
   Vector3 gravity_W = -Vector3::UnitZ();  ///< unit vector
   Vector6 tip_W = Vector6::Zero();  ///< small motion of T on top of the kinematics, [translation; rotation vector] in W
   FirstMoments first_moments;       ///< beyond the told masses; 2 x n or empty
-  JointArray spring_torque;         ///< n or empty, Nm (N): what springs add to the gravity torque
+  JointArray spring_torque;         ///< n or empty, Nm (N): what springs add to the gravity torque on each gear
 
-  /// Adds `delta` (rad, m) to the joint as its encoder would: through signs and couplings.
+  /// Adds `delta` (rad, m) to the joint as its gear would: through signs, and bars that couple it (Chain::drive).
   void add_to_joint(int joint, double delta);
 };
 
@@ -123,10 +123,10 @@ class ArmKinematics {
   [[nodiscard]] const Pose& tool_pose_W() const { return X_WT_; }
   /// [dp_WT; rotation vector] in W per unit of each state row.
   [[nodiscard]] StateMatrix<6> pose_jacobian() const;
-  /// n: moment of all weights about the axis of each joint, Nm (for a prismatic joint the force along it, N), and of
-  /// the springs. The weights are the payload's and, if the robot file gives them, the links', each at its centre of
-  /// gravity (the physical wrench), and those that the links' first moments stand for, which push no prismatic joint.
-  /// Eq. (3.6) without C and the outer J.
+  /// n: torque of all weights on the gear of each joint, Nm (for a prismatic joint the force along it, N), and of the
+  /// springs. It is the moment about the joint's axis, less what bars take over (Chain::bars). The weights are the
+  /// payload's and, if the robot file gives them, the links', each at its centre of gravity (the physical wrench), and
+  /// those that the links' first moments stand for, which push no prismatic joint. Eq. (3.6) without C and the outer J.
   [[nodiscard]] JointArray gravity_torque() const;
   /// Derivative of gravity_torque().
   [[nodiscard]] JointStateMatrix gravity_torque_jacobian() const;
@@ -134,11 +134,13 @@ class ArmKinematics {
   [[nodiscard]] Vector3 base_moment() const;
   /// Derivative of base_moment().
   [[nodiscard]] StateMatrix<3> base_moment_jacobian() const;
-  /// 6 x n: the tool's motion in W per joint deflection (signs and couplings do not enter), the J of eq. (3.6).
-  using DeflectionJacobian = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxJoints>;
-  [[nodiscard]] DeflectionJacobian deflection_jacobian() const;
-  /// Derivative of deflection_jacobian() * `deflection` with the deflection (n) held.
-  [[nodiscard]] StateMatrix<6> deflection_jacobian_derivative(const JointArray& deflection) const;
+  using JointJacobian = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, kMaxJoints>;
+  /// 6 x n: the tool's motion in W per turn of each joint about its axis (signs and couplings do not enter).
+  [[nodiscard]] JointJacobian axis_jacobian() const;
+  /// The same per deflection of each joint's gear (signs do not enter, bars do), the J of eq. (3.6).
+  [[nodiscard]] JointJacobian deflection_jacobian() const;
+  /// Derivative of deflection_jacobian() * `of_gears` with that deflection (n) held.
+  [[nodiscard]] StateMatrix<6> deflection_jacobian_derivative(const JointArray& of_gears) const;
   /// Points in W that bending depends on: a point on the axis of `joint`, the far end of its link, the centre of
   /// gravity, the tool point. Also the weight, N.
   struct LoadedLink {
@@ -167,7 +169,7 @@ class ArmKinematics {
   [[nodiscard]] LinkVectors velocities_of(const Vector3& point) const;
   /// One column per link row: the rotation of everything downstream of the link.
   [[nodiscard]] LinkVectors turns() const;
-  /// Adds to `T` what the first moments and springs change of the torque.
+  /// Adds to `T` what the first moments change of the moments about the axes.
   void add_first_moments(const LinkVectors& turn, JointStateMatrix& T) const;
 
   const Chain* chain_;

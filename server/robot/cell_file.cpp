@@ -401,6 +401,13 @@ int joint_index(const YamlMap& map, const std::string& key) {
   return number - 1;
 }
 
+CouplingKind coupling_kind(const YamlMap& map) {
+  const std::string text = map.text("kind", to_string(CouplingKind::kController));
+  for (const CouplingKind kind : {CouplingKind::kController, CouplingKind::kParallelogram})
+    if (text == to_string(kind)) return kind;
+  map.refuse("kind", refused("'{}', expected controller or parallelogram", text).with_text(text));
+}
+
 }  // namespace
 
 namespace {
@@ -436,9 +443,9 @@ Result<Chain> parse_robot(const std::string& robot_yaml, const std::string& wher
                      std::vector<Coupling> couplings;
                      if (!map.is_null("coupling")) {
                        for (const YamlMap& entry : map.maps("coupling")) {
-                         entry.only({"joint", "follows", "ratio"});
-                         couplings.push_back(
-                             {joint_index(entry, "joint"), joint_index(entry, "follows"), entry.number("ratio")});
+                         entry.only({"joint", "follows", "ratio", "kind"});
+                         couplings.push_back({joint_index(entry, "joint"), joint_index(entry, "follows"),
+                                              entry.number("ratio"), coupling_kind(entry)});
                        }
                      }
                      return Chain::make(map.text("name"), std::move(joints), std::move(couplings));

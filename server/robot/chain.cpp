@@ -7,13 +7,23 @@
 
 namespace trammel {
 
+namespace {
+
+constexpr double kLeastDeterminant = 1e-6;
+
+}  // namespace
+
+const char* to_string(CouplingKind kind) {
+  return kind == CouplingKind::kParallelogram ? "parallelogram" : "controller";
+}
+
 Result<Chain> Chain::make(std::string name, std::vector<Joint> joints, std::vector<Coupling> couplings) {
   const int n = static_cast<int>(joints.size());
   if (n == 0) return refused("robot {}: no joints", name).of("joints").beyond(0, 1);
   if (n > kMaxJoints)
     return refused("robot {}: {} joints, limit {}", name, n, kMaxJoints).of("joints").beyond(n, kMaxJoints);
   Chain chain;
-  chain.transmission_ = Eigen::MatrixXd::Zero(n, n);
+  Eigen::VectorXd signs(n);
   for (int i = 0; i < n; ++i) {
     const Joint& joint = joints[static_cast<std::size_t>(i)];
     if (!(joint.lower < joint.upper)) {
@@ -27,8 +37,9 @@ Result<Chain> Chain::make(std::string name, std::vector<Joint> joints, std::vect
           .of(fmt::format("joints {}: sign", i + 1))
           .with_value(joint.sign);
     }
-    chain.transmission_(i, i) = joint.sign;
+    signs(i) = joint.sign;
   }
+  chain.transmission_ = chain.drive_ = signs.asDiagonal();
   for (const Coupling& coupling : couplings) {
     if (coupling.joint < 0 || coupling.joint >= n || coupling.follows < 0 || coupling.follows >= n ||
         coupling.joint == coupling.follows) {
@@ -38,9 +49,16 @@ Result<Chain> Chain::make(std::string name, std::vector<Joint> joints, std::vect
           .beyond(std::max(coupling.joint, coupling.follows) + 1, n);
     }
     chain.transmission_(coupling.joint, coupling.follows) += coupling.ratio;
+    if (coupling.kind != CouplingKind::kParallelogram) continue;
+    chain.drive_(coupling.joint, coupling.follows) += coupling.ratio;
+    chain.has_bars_ = true;
   }
-  if (std::abs(chain.transmission_.determinant()) < 1e-6)
-    return refused("robot {}: couplings cannot be inverted", name).of("coupling");
+  for (const Eigen::MatrixXd* coupled : {&chain.transmission_, &chain.drive_}) {
+    if (std::abs(coupled->determinant()) < kLeastDeterminant)
+      return refused("robot {}: couplings cannot be inverted", name).of("coupling");
+  }
+  chain.bars_ = chain.drive_ * signs.asDiagonal();
+  chain.couplings_ = std::move(couplings);
   chain.name_ = std::move(name);
   chain.joints_ = std::move(joints);
   return chain;
@@ -57,6 +75,16 @@ std::vector<LinkGeometry> Chain::links_at(const JointVector& q) const {
     links.push_back(link);
   }
   return links;
+}
+
+JointVector Chain::gear_angles(const JointVector& q) const {
+  if (counts_gears()) return q;
+  return drive_.partialPivLu().solve(transmission_ * q);
+}
+
+JointVector Chain::commanded(const JointVector& gears) const {
+  if (counts_gears()) return gears;
+  return transmission_.partialPivLu().solve(drive_ * gears);
 }
 
 bool Chain::has_link_masses() const {

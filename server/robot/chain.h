@@ -43,11 +43,21 @@ struct Joint {
   std::optional<double> max_speed;  ///< rad/s (m/s)
 };
 
+/// Who lets a joint follow another one: server/robot/README.md says what that means for gears.
+enum class CouplingKind {
+  kController,     ///< the controller's way of counting; the arm is serial, each gear sits between two links
+  kParallelogram,  ///< bars: the gear of the joint turns its link against the base, whatever the other joint does
+};
+
+/// As robot files spell it.
+[[nodiscard]] const char* to_string(CouplingKind kind);
+
 /// Joint `joint` moves by `ratio` times the commanded value of joint `follows` in addition to its own (0-based).
 struct Coupling {
   int joint = 0;
   int follows = 0;
   double ratio = 0;
+  CouplingKind kind = CouplingKind::kController;
 };
 
 /// A robot as its maker describes it. An immutable value.
@@ -62,8 +72,21 @@ class Chain {
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] int size() const { return static_cast<int>(joints_.size()); }
   [[nodiscard]] const Joint& joint(int i) const { return joints_[static_cast<std::size_t>(i)]; }
+  [[nodiscard]] const std::vector<Coupling>& couplings() const { return couplings_; }
   /// n x n: d(kinematic joint value)/d(commanded joint value): signs and couplings.
   [[nodiscard]] const Eigen::MatrixXd& transmission() const { return transmission_; }
+  /// n x n: d(kinematic joint value)/d(gear angle): signs, and what bars couple.
+  [[nodiscard]] const Eigen::MatrixXd& drive() const { return drive_; }
+  /// n x n: drive() of gears that are counted as their axes turn. What a gear gives way moves the joints by it; its
+  /// transpose makes the torques on the gears of those about the axes.
+  [[nodiscard]] const Eigen::MatrixXd& bars() const { return bars_; }
+  /// Whether bars couple joints: else bars() is the identity.
+  [[nodiscard]] bool has_bars() const { return has_bars_; }
+  /// Whether the controller counts the angles of the gears: else gear_angles() changes something.
+  [[nodiscard]] bool counts_gears() const { return transmission_ == drive_; }
+  /// The angles of the gears at the commanded `q`; commanded() is the way back. Linear: of differences as well.
+  [[nodiscard]] JointVector gear_angles(const JointVector& q) const;
+  [[nodiscard]] JointVector commanded(const JointVector& gears) const;
 
   /// The nominal links with the joints at the commanded `q`.
   [[nodiscard]] std::vector<LinkGeometry> links_at(const JointVector& q) const;
@@ -71,6 +94,8 @@ class Chain {
   [[nodiscard]] Pose flange_pose(const JointVector& q) const;
   /// 6 x n geometric Jacobian of the point `p_F` (m, in F): [dp; rotation vector] in B per commanded joint, eq. (3.7).
   [[nodiscard]] Eigen::MatrixXd jacobian(const JointVector& q, const Vector3& p_F = Vector3::Zero()) const;
+  /// The same per gear angle.
+  [[nodiscard]] Eigen::MatrixXd gear_jacobian(const JointVector& q, const Vector3& p_F = Vector3::Zero()) const;
   /// Whether any link's weight is known.
   [[nodiscard]] bool has_link_masses() const;
   /// Index of the first joint outside its limits (beyond `tolerance`), if any.
@@ -79,7 +104,9 @@ class Chain {
  private:
   std::string name_;
   std::vector<Joint> joints_;
-  Eigen::MatrixXd transmission_;
+  std::vector<Coupling> couplings_;
+  Eigen::MatrixXd transmission_, drive_, bars_;
+  bool has_bars_ = false;
 };
 
 }  // namespace trammel

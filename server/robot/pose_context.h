@@ -19,7 +19,7 @@ struct PoseContext {
   std::optional<double> time;           ///< s
   std::optional<double> temperature;    ///< degrees Celsius
   std::optional<JointVector> velocity;  ///< rad/s (m/s), size n; from neighbouring poses in time
-  std::vector<int> direction;           ///< approach direction of each joint, -1, 0, +1; empty when not recorded
+  std::vector<int> direction;           ///< approach side of each joint's gear, -1, 0, +1; empty: not recorded
   std::optional<JointVector> before;    ///< joints of the pose that the robot came from, size n; where that is known
   std::vector<double> lagged;           ///< degrees Celsius, as bodies feel it that follow by kHeatLags; empty: unknown
   std::string tool;                     ///< id in the cell file

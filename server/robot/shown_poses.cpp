@@ -214,16 +214,6 @@ std::vector<FileNumber> file_numbers(const Chain& robot) {
   return all;
 }
 
-/// The couplings as the file has them.
-std::vector<Coupling> couplings_of(const Chain& robot) {
-  std::vector<Coupling> all;
-  for (int j = 0; j < robot.size(); ++j) {
-    for (int k = 0; k < robot.size(); ++k)
-      if (j != k && robot.transmission()(j, k) != 0) all.push_back({j, k, robot.transmission()(j, k)});
-  }
-  return all;
-}
-
 std::vector<Joint> joints_of(const Chain& robot) {
   std::vector<Joint> joints;
   for (int j = 0; j < robot.size(); ++j) joints.push_back(robot.joint(j));
@@ -235,7 +225,7 @@ Chain changed(const Chain& robot, const std::vector<FileNumber>& numbers, const 
   std::vector<Joint> joints = joints_of(robot);
   for (std::size_t k = 0; k < numbers.size(); ++k)
     joints[static_cast<std::size_t>(numbers[k].joint)].link.*numbers[k].number += by(static_cast<Eigen::Index>(k));
-  return Chain::make(robot.name(), std::move(joints), couplings_of(robot)).value_or(robot);
+  return Chain::make(robot.name(), std::move(joints), robot.couplings()).value_or(robot);
 }
 
 /// Gauss-Newton over the numbers; of those that the poses do not tell apart, the shortest change.
@@ -275,7 +265,7 @@ std::string change_text(const Chain& robot, const FileNumber& number, double by)
 std::vector<std::pair<std::string, Chain>> other_senses(const Chain& robot) {
   std::vector<std::pair<std::string, Chain>> all;
   const std::vector<Joint> joints = joints_of(robot);
-  const std::vector<Coupling> couplings = couplings_of(robot);
+  const std::vector<Coupling> couplings = robot.couplings();
   const auto add = [&](std::string text, std::vector<Joint> of, std::vector<Coupling> with) {
     if (auto chain = Chain::make(robot.name(), std::move(of), std::move(with)))
       all.emplace_back(std::move(text), *chain);

@@ -119,16 +119,22 @@ double rocker_angle(double crank_angle) {
 }
 
 TEST(JointPhysics, AParallelogramWithWrongBarsIsDescribed) {
-  // Joint 3 is commanded against the horizontal, as arms with a parallelogram are: it follows joint 2 backwards.
+  // Joint 3 is commanded against the horizontal, as arms with a parallelogram are: it follows joint 2 backwards. Its
+  // gear turns the forearm against the base, so what the gear of joint 2 gives way leaves the forearm as it stands.
   HeavyArm arm = arm_with(3, [](const MeasuringPose& p, Moment& m) {
     const double between = p.q(2) - p.q(1);
     const double crank = between + std::numbers::pi / 2;
     m.q(2) = between + rocker_angle(crank) - crank;
+    const hidden::Joints moments = hidden::load_moments(m.arm, m.q);
+    const double upper = m.arm.give(1) * (moments(1) - moments(2));
+    m.q(1) += upper;
+    m.q(2) += m.arm.give(2) * moments(2) - upper;
+    m.arm.give(1) = m.arm.give(2) = 0;
   });
   auto cell = std::make_shared<Cell>(*arm.cell);
   std::vector<Joint> joints;
   for (int j = 0; j < cell->robot.size(); ++j) joints.push_back(cell->robot.joint(j));
-  cell->robot = test::demand(Chain::make("with a parallelogram", joints, {{2, 1, -1.0}}));
+  cell->robot = test::demand(Chain::make("with a parallelogram", joints, {{2, 1, -1.0, CouplingKind::kParallelogram}}));
   arm.cell = cell;
   const auto poses = [](std::uint64_t seed) {
     hidden::Random random(seed);

@@ -83,11 +83,7 @@ Chain altered(const Chain& robot, int joint, double LinkGeometry::*number, doubl
   std::vector<Joint> joints;
   for (int j = 0; j < robot.size(); ++j) joints.push_back(robot.joint(j));
   joints[static_cast<std::size_t>(joint)].link.*number += by;
-  std::vector<Coupling> couplings;
-  for (int j = 0; j < robot.size(); ++j)
-    for (int k = 0; k < robot.size(); ++k)
-      if (j != k && robot.transmission()(j, k) != 0) couplings.push_back({j, k, robot.transmission()(j, k)});
-  return *Chain::make(robot.name(), joints, couplings);
+  return *Chain::make(robot.name(), joints, robot.couplings());
 }
 
 class EveryMakersAngles : public testing::TestWithParam<std::tuple<std::string, Angles, std::string>> {};

@@ -151,6 +151,29 @@ TEST(ErrorSources, JacobiansOfARailFitCentralDifferencesAloneAndTogether) {
   expect_exact_derivatives(cell, all);
 }
 
+/// Cell-7 with joint 3 counted the other way and coupled to joint 2.
+std::shared_ptr<const Cell> coupled_cell(CouplingKind kind) {
+  auto cell = std::make_shared<Cell>(*cell_7());
+  std::vector<Joint> joints;
+  for (int j = 0; j < cell->robot.size(); ++j) joints.push_back(cell->robot.joint(j));
+  joints[2].sign = -1;
+  cell->robot = *Chain::make("coupled", joints, {{2, 1, -1.0, kind}});
+  return cell;
+}
+
+TEST(ErrorSources, JacobiansOfCoupledJointsFitCentralDifferencesAloneAndTogether) {
+  for (const CouplingKind kind : {CouplingKind::kController, CouplingKind::kParallelogram}) {
+    const auto cell = coupled_cell(kind);
+    for (const std::string& spec : every_spec()) expect_exact_derivatives(cell, {spec});
+    for (const char* compliance : {"compliance_first_order", "compliance_equilibrium", "compliance_linear"}) {
+      std::vector<std::string> all = {compliance};
+      for (const std::string& spec : every_spec())
+        if (!spec.starts_with("compliance")) all.push_back(spec);
+      expect_exact_derivatives(cell, all);
+    }
+  }
+}
+
 TEST(ErrorSources, ThreeFormsOfComplianceAgreeToFirstOrderAndDifferBySquares) {
   const auto cell = cell_7();
   const PoseContext context = some_pose(*cell, 7);

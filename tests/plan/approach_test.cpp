@@ -50,6 +50,22 @@ TEST(Approach, EachJointComesFromBothSidesEquallyOftenAndNoTwoTogether) {
   EXPECT_EQ(together, 48 * Eigen::MatrixXi::Identity(6, 6));
 }
 
+TEST(Approach, TheGearsComeFromOneSideWhateverTheControllerCounts) {
+  const Chain robot = test::cell_7()->robot;
+  std::vector<Joint> joints;
+  for (int j = 0; j < robot.size(); ++j) joints.push_back(robot.joint(j));
+  for (const double ratio : {-1.0, 1.0}) {
+    const Result<Chain> coupled = Chain::make("coupled", joints, {{2, 1, ratio}});
+    ASSERT_TRUE(coupled);
+    const JointVector q = JointVector::Constant(6, 0.1);
+    for (const int direction : {1, -1}) {
+      const JointVector move = q - *bump_pose(*coupled, q, direction);
+      EXPECT_NEAR(move(1), direction * from_deg(5), 1e-12);
+      EXPECT_NEAR(move(2) + ratio * move(1), direction * from_deg(5), 1e-12) << "what the gear of joint 3 turns";
+    }
+  }
+}
+
 TEST(Approach, TheProgramGridNeverLeavesTheLimits) {
   Joint joint;
   joint.lower = from_deg(-10.00004);

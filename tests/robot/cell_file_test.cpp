@@ -99,6 +99,20 @@ TEST(CellFile, RefusesWithFileKeyAndReason) {
   EXPECT_FALSE(read_cell("/no/such/cell.yaml"));
 }
 
+TEST(CellFile, ACouplingIsTheControllersOrOneOfBars) {
+  const std::string cell = *read_text_file(shipped("config/cell-7.yaml"));
+  const std::string robot = *read_text_file(shipped("models/abb_irb6640-205-275.yaml"));
+  const auto coupled = [&](const std::string& kind) {
+    return parse_cell(cell, with(robot, "coupling: []", "coupling: [{joint: 3, follows: 2, ratio: -1" + kind + "}]"),
+                      "cell.yaml");
+  };
+  EXPECT_EQ(coupled("")->robot.couplings().front().kind, CouplingKind::kController);
+  EXPECT_EQ(coupled(", kind: controller")->robot.couplings().front().kind, CouplingKind::kController);
+  EXPECT_EQ(coupled(", kind: parallelogram")->robot.couplings().front().kind, CouplingKind::kParallelogram);
+  EXPECT_EQ(refusal_of(coupled(", kind: belt")), Refusal("cell.yaml (robot)", 13, "coupling 1: kind").text("belt"));
+  EXPECT_EQ(read_robot(shipped("models/fanuc_m-20ia.yaml"))->couplings().front().kind, CouplingKind::kController);
+}
+
 TEST(CellFile, ARobotFileThatIsAPipeIsRefusedAndNotWaitedFor) {
   const test::TemporaryFolder folder;
   ASSERT_EQ(::mkfifo(folder.file("robot.yaml").c_str(), 0600), 0);

@@ -44,6 +44,23 @@ JointVector random_joints(int n, std::mt19937_64& random) {
   return q;
 }
 
+TEST(Chain, TheGearsOfACountingControllerTurnTheJointsAndThoseOfBarsAreCommanded) {
+  std::mt19937_64 random(3);
+  const Chain serial = odd_arm();
+  std::vector<Joint> joints;
+  for (int j = 0; j < serial.size(); ++j) joints.push_back(serial.joint(j));
+  const Chain bars = *Chain::make("bars", joints, {{3, 2, -0.8, CouplingKind::kParallelogram}});
+  const JointVector q = random_joints(4, random);
+  EXPECT_EQ(bars.gear_angles(q), q);
+  const JointVector gears = serial.gear_angles(q);
+  EXPECT_EQ(gears.head(3), q.head(3));
+  EXPECT_NEAR(gears(3), q(3) + 0.8 * q(2), 1e-12) << "joint 4 counts the other way";
+  EXPECT_TRUE(serial.commanded(gears).isApprox(q, 1e-12));
+  EXPECT_TRUE(bars.drive().isApprox(bars.transmission()));
+  EXPECT_TRUE(serial.drive().isDiagonal());
+  EXPECT_EQ(serial.transmission(), bars.transmission()) << "where the flange stands is the same";
+}
+
 TEST(Chain, PutsTheThesisRobotWhereItsDrawingDoes) {
   // Arm upright and forearm level: x = a1 + d4 + d6, z = d1 + a2 + a3.
   const Pose X_BF = shipped("abb_irb6640-205-275.yaml").flange_pose(JointVector::Zero(6));

@@ -223,13 +223,9 @@ std::string robot_yaml_text(const CompensatedModel& model, const RigidRobot& rob
   text += fmt::format("version: 1\nname: {}\njoints:\n", nlohmann::json(chain.name() + ", calibrated").dump());
   for (int j = 0; j < chain.size(); ++j) text += joint_yaml(chain.joint(j), robot.links[static_cast<std::size_t>(j)]);
   std::string couplings;
-  for (int j = 0; j < chain.size(); ++j) {
-    for (int k = 0; k < chain.size(); ++k) {
-      if (k != j && chain.transmission()(j, k) != 0) {
-        couplings +=
-            fmt::format("  - {{joint: {}, follows: {}, ratio: {:.15g}}}\n", j + 1, k + 1, chain.transmission()(j, k));
-      }
-    }
+  for (const Coupling& one : chain.couplings()) {
+    couplings += fmt::format("  - {{joint: {}, follows: {}, ratio: {:.15g}, kind: {}}}\n", one.joint + 1,
+                             one.follows + 1, one.ratio, to_string(one.kind));
   }
   return text + (couplings.empty() ? "" : "coupling:\n" + couplings);
 }

@@ -87,13 +87,17 @@ struct AlongJoint {
 
 Vector3 joint_column(const PhysicalModel& model, const PoseContext& context, int joint) {
   const Pose X_FT = model.tools.at(context.tool);
-  return model.X_WB.linear() * model.cell->robot.jacobian(context.q, X_FT.translation()).col(joint).head<3>();
+  return model.X_WB.linear() * model.cell->robot.gear_jacobian(context.q, X_FT.translation()).col(joint).head<3>();
+}
+
+double gear_angle(const PhysicalModel& model, const PoseContext& context, int joint) {
+  return model.cell->robot.gear_angles(context.q)(joint);
 }
 
 AlongJoint of_position(const PhysicalModel& model, const Measurement& m, int joint, const Vector3& residual,
                        double variance) {
   const Vector3 column = joint_column(model, m.context, joint);
-  return {m.context.q(joint), column.dot(residual) / variance, column.squaredNorm() / variance};
+  return {gear_angle(model, m.context, joint), column.dot(residual) / variance, column.squaredNorm() / variance};
 }
 
 /// Of a gauge that is told against another pose, as if the joint did nothing there: enough to find an order.
@@ -102,7 +106,7 @@ AlongJoint of_gauge(const PhysicalModel& model, const Measurement& m, int joint,
   const GaugedLength length =
       gauged_length(m.gauge->kind, *anchor.said, anchor.p_W(model.values), model.pose_W(m.context).translation());
   const double column = length.by_point_W.dot(joint_column(model, m.context, joint));
-  return {m.context.q(joint), column * residual / variance, column * column / variance};
+  return {gear_angle(model, m.context, joint), column * residual / variance, column * column / variance};
 }
 
 /// The order of `source` that explains most of the residuals through its joint's Jacobian column.

@@ -147,16 +147,12 @@ void describe_circles(const JointArcs& group, const AxisFit& fit, double varianc
 /// The same robot with other links.
 Result<Chain> with_links(const Chain& robot, const std::vector<LinkGeometry>& links) {
   std::vector<Joint> joints;
-  std::vector<Coupling> couplings;
   for (int i = 0; i < robot.size(); ++i) {
     Joint joint = robot.joint(i);
     joint.link = links[static_cast<std::size_t>(i)];
     joints.push_back(joint);
-    for (int j = 0; j < robot.size(); ++j) {
-      if (i != j && robot.transmission()(i, j) != 0) couplings.push_back({i, j, robot.transmission()(i, j)});
-    }
   }
-  return Chain::make(robot.name(), std::move(joints), std::move(couplings));
+  return Chain::make(robot.name(), std::move(joints), robot.couplings());
 }
 
 /// Variance of one coordinate from the residuals, as far as it is above what was stated.

@@ -30,9 +30,9 @@ struct Pass {
 constexpr Pass kPasses[] = {{48, 50}, {kMostHarmonics, 30}};
 
 /// As many harmonics as there are different angles for, in the range that they have.
-int most_harmonics(const MeasurementBatch& batch, int joint) {
+int most_harmonics(const Chain& robot, const MeasurementBatch& batch, int joint) {
   std::vector<double> angles;
-  for (const Measurement& m : batch.measurements) angles.push_back(m.context.q(joint));
+  for (const Measurement& m : batch.measurements) angles.push_back(robot.gear_angles(m.context.q)(joint));
   std::sort(angles.begin(), angles.end());
   const double range = angles.back() - angles.front();
   const auto same = [](double a, double b) { return b - a < kSameAngle; };
@@ -123,7 +123,7 @@ class MapSearch {
   MapSearch(const CalibrationResult& without, const MeasurementBatch& batch, const std::vector<int>& joints)
       : problem_{without.model, aligned(batch, without.sessions, without.model.cell->tracker)},
         weights_{without.discrepancy, without.discrepancy_rotation, true} {
-    for (const int joint : joints) most_[joint] = most_harmonics(batch, joint);
+    for (const int joint : joints) most_[joint] = most_harmonics(without.model.cell->robot, batch, joint);
   }
 
   std::map<int, MapSpectrum> run() {

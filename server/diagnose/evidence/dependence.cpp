@@ -183,7 +183,7 @@ Circumstances circumstances_of(const LinearProblem& problem, const std::vector<I
   Circumstances all{MatrixXd(n, joints), MatrixXd(n, joints), VectorXd(n)};
   for (Index i = 0; i < n; ++i) {
     const Measurement& m = problem.batch().measurements[static_cast<std::size_t>(poses[static_cast<std::size_t>(i)])];
-    all.q.row(i) = m.context.q.transpose();
+    all.q.row(i) = problem.gear_angles(poses[static_cast<std::size_t>(i)]).transpose();
     all.torque.row(i) = ArmKinematics(problem.model().state(m.context)).gravity_torque().matrix().transpose();
     all.time(i) = static_cast<double>(m.context.index);
   }

@@ -32,6 +32,10 @@ class LinearProblem {
 
   [[nodiscard]] const PhysicalModel& model() const { return model_; }
   [[nodiscard]] const MeasurementBatch& batch() const { return *batch_; }
+  /// n: of the gears at that pose (Chain::gear_angles), which causes of joints act on.
+  [[nodiscard]] JointVector gear_angles(Eigen::Index pose) const {
+    return model_.cell->robot.gear_angles(batch_->measurements[static_cast<std::size_t>(pose)].context.q);
+  }
   /// R: measured - model, whitened.
   [[nodiscard]] const Eigen::VectorXd& residual() const { return residual_; }
   /// R: measured - `model`, by the same weights.
@@ -41,7 +45,7 @@ class LinearProblem {
   [[nodiscard]] const std::vector<Parameter>& nuisance_parameters() const { return priors_; }
   /// The wanted sources, in the order of `further`.
   [[nodiscard]] const std::vector<Effect>& effects() const { return effects_; }
-  /// R x n: what one radian (metre) of each joint does, whitened.
+  /// R x n: what one radian (metre) of each joint's gear does, whitened.
   [[nodiscard]] const Eigen::MatrixXd& by_joint() const { return by_joint_; }
   /// R: 1 / standard deviation of each row, in 1/m and 1/rad.
   [[nodiscard]] const Eigen::VectorXd& weight() const { return weight_; }

@@ -32,8 +32,7 @@ class OrderFamily final : public Family {
   OrderFamily(const LinearProblem& problem, Cause cause)
       : problem_(problem), cause_(std::move(cause)), joint_(cause_.joint) {
     q_.resize(problem.poses());
-    for (Index i = 0; i < q_.size(); ++i)
-      q_(i) = problem.batch().measurements[static_cast<std::size_t>(i)].context.q(joint_);
+    for (Index i = 0; i < q_.size(); ++i) q_(i) = problem.gear_angles(i)(joint_);
     const double span = q_.maxCoeff() - q_.minCoeff();
     step_ = kStep * 2 * kPi / std::max(span, thresholds::kSmallestSpan);
     turn_ = {(step_ * q_).array().sin(), (step_ * q_).array().cos()};

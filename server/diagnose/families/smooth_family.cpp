@@ -52,8 +52,7 @@ VectorXd spread(const VectorXd& x, double smallest) {
 
 VectorXd angles(const LinearProblem& problem, int joint) {
   VectorXd q(problem.poses());
-  for (Index i = 0; i < q.size(); ++i)
-    q(i) = problem.batch().measurements[static_cast<std::size_t>(i)].context.q(joint);
+  for (Index i = 0; i < q.size(); ++i) q(i) = problem.gear_angles(i)(joint);
   return q;
 }
 

@@ -22,7 +22,7 @@ bool none(const MeasurementBatch& batch, bool (*has)(const PoseContext&)) {
 
 }  // namespace
 
-Surrogates put_in_surrogates(MeasurementBatch& batch) {
+Surrogates put_in_surrogates(MeasurementBatch& batch, const Chain& robot) {
   if (!none(batch, [](const PoseContext& c) { return c.velocity.has_value(); })) return {};
   const Surrogates put = {none(batch, [](const PoseContext& c) { return c.time.has_value(); }),
                           none(batch, [](const PoseContext& c) { return c.temperature.has_value(); }),
@@ -34,11 +34,10 @@ Surrogates put_in_surrogates(MeasurementBatch& batch) {
     if (put.time) m.context.time = kBetweenPoses * row;
     if (put.temperature) m.context.temperature = 20 + kWarming * (1 - std::exp(-row / (kWarmingScale * count)));
     if (put.direction) {
-      m.context.direction.assign(static_cast<std::size_t>(m.context.q.size()), 0);
-      for (Eigen::Index j = 0; last != nullptr && j < m.context.q.size(); ++j) {
-        const double way = m.context.q(j) - last->context.q(j);
-        m.context.direction[static_cast<std::size_t>(j)] = way > 0 ? 1 : way < 0 ? -1 : 0;
-      }
+      const JointVector way = robot.gear_angles(last == nullptr ? JointVector::Zero(m.context.q.size())
+                                                                : JointVector(m.context.q - last->context.q));
+      m.context.direction.clear();
+      for (const double one : way) m.context.direction.push_back(one > 0 ? 1 : one < 0 ? -1 : 0);
     }
     last = &m;
     ++row;

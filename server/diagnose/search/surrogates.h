@@ -10,8 +10,9 @@ namespace trammel::cause_search {
 struct Surrogates {
   bool time = false, temperature = false, direction = false;  ///< which were put in
 };
-/// Fills in what no row has. `batch` is in its order of measuring; nothing is put into a continuous path.
-[[nodiscard]] Surrogates put_in_surrogates(MeasurementBatch& batch);
+/// Fills in what no row has. `batch` is in its order of measuring; nothing is put into a continuous path. Sides of
+/// approach are those of the gears of `robot`, or of the joints where none is given.
+[[nodiscard]] Surrogates put_in_surrogates(MeasurementBatch& batch, const Chain& robot = {});
 
 /// Copies what was put into the rows of `whole` to the same rows of `part`. In `part` rows have been set aside or
 /// merged since, so that the row before no longer says where a joint came from.

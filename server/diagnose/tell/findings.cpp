@@ -44,7 +44,7 @@ Estimate amplitude_of(const std::string& name, const Eigen::Vector2d& value, con
 
 /// What a map makes of a joint's angle between the two poses that it moves farthest apart. `values`: a sine and a
 /// cosine of every harmonic, rad.
-Estimate peak_to_peak_of(const MeasurementBatch& batch, int joint, const VectorXd& values, const MatrixXd& covariance) {
+Estimate peak_to_peak_of(const LinearProblem& problem, int joint, const VectorXd& values, const MatrixXd& covariance) {
   const auto functions = [&](double q) {
     VectorXd f(values.size());
     for (Index h = 0; 2 * h + 1 < f.size(); ++h) {
@@ -55,8 +55,8 @@ Estimate peak_to_peak_of(const MeasurementBatch& batch, int joint, const VectorX
   };
   VectorXd lowest;
   VectorXd highest;
-  for (const Measurement& m : batch.measurements) {
-    const VectorXd here = functions(m.context.q(joint));
+  for (Index i = 0; i < problem.poses(); ++i) {
+    const VectorXd here = functions(problem.gear_angles(i)(joint));
     if (lowest.size() == 0 || values.dot(here) < values.dot(lowest)) lowest = here;
     if (highest.size() == 0 || values.dot(here) > values.dot(highest)) highest = here;
   }
@@ -88,7 +88,7 @@ std::vector<Estimate> parameters_of(const LinearProblem& problem, const std::str
   } else if (summary == Summary::kAmplitude) {
     estimates.push_back(amplitude_of("amplitude", values.head<2>(), covariance.topLeftCorner<2, 2>()));
   } else if (summary == Summary::kPeakToPeak && values.size() > 0) {
-    estimates.push_back(peak_to_peak_of(problem.batch(), cause.joint, values, covariance));
+    estimates.push_back(peak_to_peak_of(problem, cause.joint, values, covariance));
   }
   if (!cause.parameter.empty()) {
     const OwnEstimate own = own_estimate(problem, source, estimated.change, estimated.covariance);

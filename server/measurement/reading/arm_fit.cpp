@@ -110,9 +110,9 @@ ArmState state_of(const Measurement& from, JointVector q, const Cell& cell, cons
 void give_way(ArmState& state, const ArmFit& fit, JointArray* torque) {
   const int n = state.chain->size();
   *torque = ArmKinematics(state).gravity_torque();
+  const JointArray turned = state.chain->bars() * fit.arm.segment(5 * n, n).cwiseProduct(*torque);
   for (int j = 0; j < n; ++j) {
-    if (state.chain->joint(j).type == JointType::kRevolute)
-      state.links[static_cast<std::size_t>(j)].theta += fit.arm(5 * n + j) * (*torque)(j);
+    if (state.chain->joint(j).type == JointType::kRevolute) state.links[static_cast<std::size_t>(j)].theta += turned(j);
   }
 }
 
@@ -140,12 +140,13 @@ class Prediction {
       for (int i = 0; i < n; ++i) {
         if (const double share = robot.transmission()(i, j); share != 0)
           J.col(arm + j) += share * column(rows.of_joint(robot, i));
+        if (const double share = robot.bars()(i, j); share != 0)
+          J.col(arm + 5 * n + j) += share * torque_(j) * column(rows.theta(i));
       }
       J.col(arm + n + j) = column(rows.a(j));
       J.col(arm + 2 * n + j) = column(rows.d(j));
       J.col(arm + 3 * n + j) = column(rows.alpha(j));
       J.col(arm + 4 * n + j) = column(rows.beta(j));
-      J.col(arm + 5 * n + j) = torque_(j) * column(rows.theta(j));
     }
     return J;
   }

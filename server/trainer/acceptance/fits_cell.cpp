@@ -12,7 +12,7 @@ namespace {
 
 /// Whether a model of one serves the other: the kinematics count, names and priors do not.
 bool same_robot(const Chain& a, const Chain& b) {
-  if (a.size() != b.size() || a.transmission() != b.transmission()) return false;
+  if (a.size() != b.size() || a.transmission() != b.transmission() || a.drive() != b.drive()) return false;
   for (int i = 0; i < a.size(); ++i) {
     const Joint& one = a.joint(i);
     const Joint& other = b.joint(i);
