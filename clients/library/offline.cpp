@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <tuple>
 
 #include "clients/library/convert.h"
 #include "clients/library/inside.h"
@@ -292,6 +293,26 @@ std::vector<double> Model::parameter_covariance() const {
 Evaluation Model::figures() const {
   const auto& parts = inside_->model.parts();
   return evaluation_of(parts.validation.value_or(parts.training));
+}
+
+Measured Model::measured() const {
+  const std::optional<WhatWasMeasured>& known = inside_->model.parts().measured;
+  const trammel::Cell& cell = inside_->model.cell();
+  Measured out;
+  out.sentence = in_words(known, cell);
+  out.instrument = words_of(known, cell).instrument;
+  if (!known) return out;
+  out.poses = known->poses;
+  for (const auto& joint : known->approaches) {
+    out.from_above.push_back(joint.falling);
+    out.from_below.push_back(joint.rising);
+  }
+  if (known->temperature) std::tie(out.temperature_min_c, out.temperature_max_c) = *known->temperature;
+  out.lower_mm = mm(known->lower);
+  out.upper_mm = mm(known->upper);
+  out.volume_m3 = known->volume;
+  if (known->reach) out.reach_mm = to_mm(*known->reach);
+  return out;
 }
 
 std::vector<Note> Model::notes() const { return library::to_api(notes_of(inside_->model)); }

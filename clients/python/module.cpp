@@ -325,6 +325,26 @@ py::list parameters_of(const api::Model& model) {
   });
 }
 
+/// The keys of `measured` in `trammel train --json`.
+py::dict measured_of(const api::Model& model) {
+  const api::Measured m = model.measured();
+  py::dict out("sentence"_a = m.sentence);
+  if (m.poses == 0) return out;
+  py::list sides;
+  for (std::size_t j = 0; j < m.from_above.size(); ++j)
+    sides.append(py::dict("from_above"_a = m.from_above[j], "from_below"_a = m.from_below[j]));
+  out["poses"] = m.poses;
+  out["sides"] = sides;
+  out["temperature_c"] = py::none();
+  if (m.temperature_min_c)
+    out["temperature_c"] = py::dict("min"_a = *m.temperature_min_c, "max"_a = *m.temperature_max_c);
+  out["box_mm"] = py::dict("lower"_a = m.lower_mm, "upper"_a = m.upper_mm);
+  out["volume_m3"] = m.volume_m3;
+  out["reach_mm"] = m.reach_mm;
+  out["instrument"] = m.instrument;
+  return out;
+}
+
 py::array_t<double> covariance_of(const api::Model& model) {
   const std::vector<double> flat = model.parameter_covariance();
   const auto size = static_cast<py::ssize_t>(model.parameters().size());
@@ -355,6 +375,7 @@ void add_model_file(py::class_<api::Model>& type) {
       .def("parameters", &parameters_of)
       .def("parameter_covariance", &covariance_of)
       .def("figures", [](const api::Model& model) { return to_python(model.figures()); })
+      .def("measured", &measured_of)
       .def("notes", [](const api::Model& model) { return to_python(model.notes()); });
 }
 

@@ -13,8 +13,9 @@ namespace trammel {
 
 namespace {
 
-constexpr int kPoses = 600;  // of the domain, drawn
-constexpr int kDraws = 16;   // of the true error at each
+constexpr int kPoses = 600;     // of the domain, drawn
+constexpr int kDraws = 16;      // of the true error at each
+constexpr int kMostDraws = 50;  // of joint vectors for each pose that is near a measured one
 constexpr std::uint64_t kSeed = 20261123;
 constexpr int kGrid = 20;                // steps on each side of 1
 constexpr double kFarthest = 4;          // standard deviations that the grids reach
@@ -101,11 +102,13 @@ std::vector<PoseContext> poses_in_range(const CompensatedModel& model, int count
   }
   std::vector<PoseContext> poses;
   SeededRandom random(kSeed);
-  for (int i = 0; i < count && !trained_with.empty(); ++i) {
+  if (trained_with.empty()) return poses;
+  for (int drawn = 0; drawn < kMostDraws * count && static_cast<int>(poses.size()) < count; ++drawn) {
     PoseContext context;
     context.q = parts.q_min;
     for (Eigen::Index j = 0; j < context.q.size(); ++j) context.q(j) = random.uniform(parts.q_min(j), parts.q_max(j));
-    std::tie(context.tool, context.payload) = trained_with[static_cast<std::size_t>(i) % trained_with.size()];
+    if (parts.measured && !parts.measured->is_near(model.cell().robot, context.q)) continue;
+    std::tie(context.tool, context.payload) = trained_with[poses.size() % trained_with.size()];
     context.served = true;
     poses.push_back(std::move(context));
   }
@@ -123,11 +126,8 @@ std::vector<PoseContext> poses_of_domain(const CompensatedModel& model, int coun
 void PositionAccuracy::draw(const std::vector<ErrorPrediction>& poses, double tracker_sigma) {
   SeededRandom random(kSeed + 1);
   Vector3 last_error = Vector3::Zero(), last_place = Vector3::Zero();
-  lower_ = upper_ = poses.front().X_BT_predicted.translation();
   for (const ErrorPrediction& pose : poses) {
     const Vector3 place = pose.X_BT_predicted.translation();
-    lower_ = lower_.cwiseMin(place);
-    upper_ = upper_.cwiseMax(place);
     const Matrix3 root = root_of_true(pose.covariance_B, tracker_sigma * tracker_sigma);
     for (int k = 0; k < kDraws; ++k) {
       const Vector3 error = root * normal_vector(random);

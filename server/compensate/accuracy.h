@@ -50,9 +50,6 @@ class PositionAccuracy {
   [[nodiscard]] double hidden() const { return hidden_; }
   /// Poses that were not trained on and judged this; 0: the training's own statistics alone.
   [[nodiscard]] int judged_by() const { return judged_by_; }
-  /// Where the tool is at poses of the domain, corners of a box in B, m.
-  [[nodiscard]] const Vector3& lower() const { return lower_; }
-  [[nodiscard]] const Vector3& upper() const { return upper_; }
 
  private:
   /// A factor on the stated standard deviations, and how likely it is.
@@ -65,13 +62,12 @@ class PositionAccuracy {
   std::vector<double> errors_;     // m, rising: |t| of draws at poses of the domain, as stated
   std::vector<double> distances_;  // m, rising: likewise, of distances between two
   std::vector<Factor> factors_;
-  Vector3 lower_ = Vector3::Zero(), upper_ = Vector3::Zero();
   double hidden_ = 0;
   int judged_by_ = 0;
 };
 
-/// Joint vectors within the range of the training poses, drawn evenly, with the tools and payloads of the training in
-/// turn. None where the cell has none of these any more.
+/// Joint vectors within the range of the training poses and near a measured one, drawn evenly, with the tools and
+/// payloads of the training in turn. None where the cell has none of these any more; fewer where hardly any is near.
 [[nodiscard]] std::vector<PoseContext> poses_in_range(const CompensatedModel& model, int count);
 /// Those of them that the model says are in its domain.
 [[nodiscard]] std::vector<PoseContext> poses_of_domain(const CompensatedModel& model, int count);

@@ -29,8 +29,8 @@ struct ErrorPrediction {
   Matrix3 covariance_B = Matrix3::Zero();
   /// Of one measured orientation, rad, about the axes of B; only where the model learned orientations.
   std::optional<Vector3> rotation_stddev_B;
-  bool in_domain = false;  ///< false: the bias is not fully taken
-  double bias_weight = 0;  ///< share of the bias' kernel in error_B: 1 in domain, 0 well outside
+  bool in_domain = false;  ///< false: far from all training poses, or the bias is not fully taken
+  double bias_weight = 0;  ///< share of the bias' kernel in error_B: 1 in domain, 0 well outside the joints' ranges
 };
 
 /// Nominal chain, identified error sources and learned bias: what a cell is served with. An immutable value, cheap to

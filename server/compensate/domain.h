@@ -9,7 +9,8 @@ struct Domain {
   JointVector q_min, q_max;      ///< range of the training poses, rad
   double prior_share_limit = 0;  ///< of BiasPrediction::prior_share, at the edge
 
-  /// Whether every joint is within the range of the training poses, or at most 5 % of that range beyond.
+  /// Whether every joint is within the range of the training poses, or at most 5 % of that range beyond. Ranges alone
+  /// hold poses that are far from all of them: WhatWasMeasured::is_near() is asked beside.
   [[nodiscard]] bool in_range(const JointVector& q) const;
   /// How much of the bias to take at a pose, in [0, 1]: 1 inside; 0 where a joint is far out of range, or where nearly
   /// as little is known as without data. Smooth in q and in `prior_share`.

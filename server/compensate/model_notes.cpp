@@ -338,6 +338,16 @@ void add_too_few_poses(const CompensatedModel::Parts& parts, std::vector<Note>& 
                    parts.rank, numbers, parts.training.poses, enough)});
 }
 
+void add_sides(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
+  const std::string side = one_sided(parts.measured);
+  if (side.empty()) return;
+  notes.push_back({kOneSide, Severity::kWarning,
+                   fmt::format("the arm came to the training poses {} only: nothing is promised of poses that it comes "
+                               "to from the other side, where the play of the gears puts the tool elsewhere "
+                               "(trammel plan goes both ways)",
+                               side)});
+}
+
 }  // namespace
 
 std::vector<Note> notes_of(const CompensatedModel& model) {
@@ -350,6 +360,7 @@ std::vector<Note> notes_of(const CompensatedModel& model) {
   add_left_over(model.parts(), notes);
   add_suspects(model.parts(), notes);
   add_untold_turn(model.parts(), notes);
+  add_sides(model.parts(), notes);
   add_off_drawing(model.parts(), notes);
   add_cell_doubts(model.cell(), notes);
   add_moved_tools(model, notes);

@@ -13,6 +13,7 @@
 #include "server/calibrate/calibration.h"
 #include "server/calibrate/changes.h"
 #include "server/compensate/evaluation.h"
+#include "server/compensate/what_was_measured.h"
 
 namespace trammel {
 
@@ -80,13 +81,14 @@ struct ModelParts {
     Eigen::MatrixXd covariance;
   };
   std::optional<BiasOrigin> bias_origin;
-  int oriented_poses = 0;                  ///< where only some poses had an orientation and none is learned: how many
-  std::vector<PoseContext> bias_contexts;  ///< of the bias' observations; empty without blocks
-  std::optional<double> temperature_mean;  ///< degrees Celsius, of the training poses; empty where not recorded
-  double temperature_stddev = 0;           ///< K
-  JointVector q_min, q_max;                ///< range of the training poses, rad
-  JointVector extrapolation_slope;         ///< see Domain::growth(); empty in models from before it was learned
-  double prior_share_limit = 0;            ///< a pose in domain has no larger prior share
+  int oriented_poses = 0;                   ///< where only some poses had an orientation and none is learned: how many
+  std::vector<PoseContext> bias_contexts;   ///< of the bias' observations; empty without blocks
+  std::optional<double> temperature_mean;   ///< degrees Celsius, of the training poses; empty where not recorded
+  double temperature_stddev = 0;            ///< K
+  JointVector q_min, q_max;                 ///< range of the training poses, rad
+  std::optional<WhatWasMeasured> measured;  ///< of the training poses; empty in models from before it was recorded
+  JointVector extrapolation_slope;          ///< see Domain::growth(); empty in models from before it was learned
+  double prior_share_limit = 0;             ///< a pose in domain has no larger prior share
   double bias_spread = 1;  ///< times the standard deviation of what a pose misses, the instrument's aside
   std::set<std::pair<std::string, std::string>> trained_with;  ///< tool and payload of each training pose
   ModelProvenance provenance;                                  ///< id and hash are filled in by make()

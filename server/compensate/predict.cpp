@@ -281,7 +281,9 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
   const Matrix3 unsaid = covariance_of_unsaid(context, !asked.temperature, prediction.X_BT_predicted.translation());
   const Domain domain{parts().q_min, parts().q_max, parts().prior_share_limit};
   const bool trained_with = learned_with(context.tool, context.payload);
-  prediction.in_domain = trained_with && domain.in_range(context.q);
+  const std::optional<WhatWasMeasured>& measured = parts().measured;
+  prediction.in_domain =
+      trained_with && domain.in_range(context.q) && (!measured || measured->is_near(cell().robot, context.q));
   pose.growth = domain.growth(context.q, parts().extrapolation_slope, cell().robot);
 
   Matrix3 covariance;

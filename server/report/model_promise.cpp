@@ -54,14 +54,6 @@ std::string overdue(const ModelProvenance& provenance) {
 
 std::string or_not_told(const std::string& text) { return text.empty() ? "not in the cell file" : text; }
 
-std::string volume(const PositionAccuracy& accuracy) {
-  std::string text;
-  for (int k = 0; k < 3; ++k)
-    text += fmt::format("{}{}\u00a0{:.0f}\u00a0to\u00a0{:.0f}", k == 0 ? "" : ", ", "xyz"[k],
-                        to_mm(accuracy.lower()(k)), to_mm(accuracy.upper()(k)));
-  return text + " mm of the tool from the robot's base, as far as its joints are where they were in training";
-}
-
 std::string joint_ranges(const CompensatedModel& model) {
   const ModelParts& parts = model.parts();
   std::string text;
@@ -92,7 +84,7 @@ std::string judged_by(const std::optional<PositionAccuracy>& accuracy) {
 std::string papers_table(const CompensatedModel& model, const std::optional<PositionAccuracy>& accuracy) {
   const CellPapers papers = papers_of(model.cell()).value_or(CellPapers{});
   const ModelProvenance& made = model.provenance();
-  const double sigma = to_mm(model.cell().tracker.sigma);
+  const MeasuredWords measured = words_of(model.parts().measured, model.cell());
   std::vector<HtmlRow> rows;
   const auto add = [&](const char* name, const std::string& value) { rows.push_back({{name, html_text(value)}}); };
   add("robot", model.cell().robot.name());
@@ -104,15 +96,17 @@ std::string papers_table(const CompensatedModel& model, const std::optional<Posi
                               confirmed->poses, confirmed->day, confirmed->position_mm, confirmed->orientation_deg)
                 : std::string("not compared with the controller (trammel confirm-robot)"));
   add("tool", tools(model.parts()));
-  add("instrument", fmt::format("{}; {:.4g} mm (1 sigma, per axis) as stated", or_not_told(papers.instrument), sigma));
+  add("instrument", measured.instrument);
   add("operator", or_not_told(papers.operator_name));
   // A batch that says no time has the date of its file, which the model does not tell from a time.
   add("measured", made.measured_at ? shown_day(*made.measured_at) + " (by time_s, else the date of the file)"
                                    : std::string("not recorded"));
   add("model", fmt::format("{}, trained {} on {} poses of {}", made.id, shown_day(made.trained_at), made.training_poses,
                            made.batch_id));
-  if (accuracy) add("this volume", volume(*accuracy));
+  add("this volume", measured.volume);
   add("joints", joint_ranges(model));
+  add("sides of approach", measured.sides);
+  add("temperature", measured.temperature);
   add("judged by", judged_by(accuracy));
   return html_table({"provenance", {}, rows});
 }
@@ -185,6 +179,12 @@ std::string hardly_judged(const PositionAccuracy& accuracy) {
   return fmt::format(", tested by {} fresh pose{} only", accuracy.judged_by(), accuracy.judged_by() == 1 ? "" : "s");
 }
 
+/// From which side poses must come, where they were measured from one; it follows "in this volume".
+std::string from_that_side(const ModelParts& parts) {
+  const std::string side = one_sided(parts.measured);
+  return side.empty() ? "" : ", for poses that the arm comes to " + side;
+}
+
 /// How many parameters the measurements determine: P - tr(prior^-1 posterior) (MacKay, Bayesian Interpolation, 1992),
 /// and where the instrument stood in each further session.
 double determined(const ModelParts& parts) {
@@ -242,18 +242,20 @@ std::string rounded_up_mm(double length) {
 
 std::string promise_sentence(const CompensatedModel& model, const std::optional<PositionAccuracy>& accuracy) {
   if (!accuracy) return "How good this model is cannot be said: it knows no pose that this cell can ask for.";
-  return fmt::format("Good to {} mm at 95 % in this volume{}; not known beyond; {}.",
-                     rounded_up_mm(accuracy->at(PositionAccuracy::kShare)), hardly_judged(*accuracy),
-                     check_by(model.provenance()));
+  return fmt::format("Good to {} mm at 95 % in this volume{}{}; not known beyond; {}.",
+                     rounded_up_mm(accuracy->at(PositionAccuracy::kShare)), from_that_side(model.parts()),
+                     hardly_judged(*accuracy), check_by(model.provenance()));
 }
 
 std::string certificate(const CompensatedModel& model, const std::optional<PositionAccuracy>& accuracy,
                         const std::optional<MeasurementBatch>& batch) {
   const std::string papers = papers_table(model, accuracy);
-  if (!accuracy) return papers;
+  const std::string about =
+      "<p class=\"about\">It rests on " + html_text(in_words(model.parts().measured, model.cell())) + ".</p>\n";
+  if (!accuracy) return about + papers;
   const std::string late = overdue(model.provenance());
   const std::optional<double> tolerance = rules_of(model.cell()).value_or(CellRules{}).tolerance;
-  return late + tolerance_sentence(*accuracy, tolerance) + tolerance_table(*accuracy, tolerance) +
+  return about + late + tolerance_sentence(*accuracy, tolerance) + tolerance_table(*accuracy, tolerance) +
          "\n<p>Distances are from the wanted position (half of a true position's diameter). This holds in the volume "
          "and with the tool and payload named below, for targets that <code>trammel correct</code> has corrected; it "
          "says of each target whether it is inside that volume and what error to expect. "

@@ -7,8 +7,8 @@
 
 namespace trammel {
 
-/// `Good to 0.082 mm at 95 % in this volume; not known beyond; check again by 2026-12-23.` Rounded up. Where no
-/// pose was held out, and where nothing is known, it says so.
+/// `Good to 0.082 mm at 95 % in this volume; not known beyond; check again by 2026-12-23.` Rounded up. Where joints
+/// came from one side, where no pose was held out, and where nothing is known, it says so.
 [[nodiscard]] std::string promise_sentence(const CompensatedModel& model,
                                            const std::optional<PositionAccuracy>& accuracy);
 

@@ -126,7 +126,9 @@ ordered_json scene_json(const CompensatedModel& model, const ShownPoses& shown) 
   ordered_json poses = measured(model, shown);
   const bool known = !poses.empty();
   if (!known) poses = expected(model, poses_of_domain(model, kUnmeasured));
-  return {{"poses", poses}, {"shell", shell_json(range, model)}, {"measured", known}};
+  ordered_json scene = {{"poses", poses}, {"shell", shell_json(range, model)}, {"measured", known}};
+  if (const auto& box = model.parts().measured) scene["box"] = {point(box->lower), point(box->upper)};
+  return scene;
 }
 
 }  // namespace trammel

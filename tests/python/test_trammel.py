@@ -122,6 +122,7 @@ class Offline(unittest.TestCase):
         printed = json.loads(command_line("evaluate", "--model", self.model_path, "--batch", self.batch_path, "--json", "-"))
         printed.pop("structure", None)
         self.assertEqual(printed.pop("notes"), self.model.notes)
+        self.assertEqual(printed.pop("measured"), json.loads(json.dumps(self.model.measured)))
         here = self.model.evaluate(trammel.Batch.load(self.batch_path))
         self.assertEqual(json.loads(json.dumps(here)), printed)
 

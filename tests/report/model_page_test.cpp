@@ -8,6 +8,7 @@
 #include <numeric>
 #include <sstream>
 
+#include "server/base/units.h"
 #include "server/base/unix_time.h"
 #include "server/measurement/checked_batch.h"
 #include "server/report/model_poses.h"
@@ -172,6 +173,43 @@ TEST_F(ModelPage, BeginsWithHowGoodItIsWhereAndUntilWhen) {
   EXPECT_LT(page.find(promise), page.find("<table"));
 }
 
+TEST_F(ModelPage, SaysWhatWasMeasuredAndDrawsIt) {
+  MeasurementBatch both = batch_;
+  for (std::size_t i = 0; i < both.measurements.size(); ++i) {
+    both.measurements[i].context.direction.assign(6, i % 2 == 0 ? -1 : 1);
+    both.measurements[i].context.temperature = 20 + 0.1 * static_cast<double>(i);
+  }
+  const CompensatedModel model = trained_on(cell_with("instrument: AT960\n"), both);
+  const std::string page = model_page(model, std::nullopt);
+  for (const char* part :
+       {"<td>sides of approach</td><td>every joint from both sides</td>", "<td>temperature</td><td>20.",
+        " degrees Celsius</td>", "mm of the tool from the robot's base",
+        "<p class=\"about\">It rests on 21 training poses; sides of approach: every joint"})
+    EXPECT_TRUE(has(page, part)) << part;
+  EXPECT_FALSE(has(promise_sentence(model, PositionAccuracy::of(model)), "comes to"));
+  const auto box = chart_data(page).at("scene").at("box");
+  EXPECT_NEAR(box.at(0).at(0), to_mm(model.parts().measured->lower.x()), 0.06);
+  EXPECT_NEAR(box.at(1).at(2), to_mm(model.parts().measured->upper.z()), 0.06);
+}
+
+TEST_F(ModelPage, APromiseOfPosesFromOneSideIsOfThatSide) {
+  MeasurementBatch above = batch_;
+  for (Measurement& m : above.measurements) m.context.direction.assign(6, -1);
+  const CompensatedModel model = trained_on(cell_with(""), above);
+  EXPECT_TRUE(has(promise_sentence(model, PositionAccuracy::of(model)),
+                  " in this volume, for poses that the arm comes to from above, by its training poses alone; not"));
+  EXPECT_TRUE(
+      has(model_page(model, std::nullopt), "nothing is promised of poses that it comes to from the other side"));
+}
+
+TEST_F(ModelPage, OfAModelThatDoesNotTellWhatWasMeasuredItSaysSo) {
+  CompensatedModel::Parts parts = trained("none").parts();
+  parts.measured.reset();
+  const std::string page = model_page(CompensatedModel::make(parts).value(), std::nullopt);
+  for (const char* part : {"<td>this volume</td><td>not on record</td>", "<td>sides of approach</td><td>not on record"})
+    EXPECT_TRUE(has(page, part)) << part;
+}
+
 TEST_F(ModelPage, SaysFirstWhereNoPoseHasTestedIt) {
   const CompensatedModel model = trained("none");
   EXPECT_TRUE(has(promise_sentence(model, PositionAccuracy::of(model)), " volume, by its training poses alone; not"));
@@ -201,7 +239,7 @@ TEST_F(ModelPage, ItsFirstPageNamesRobotInstrumentAndOperatorAsTheCellFileHasThe
   const std::string page =
       model_page(trained_on(cell_with("serial_number: 66-70 <b>\ninstrument: AT960\noperator: I. Newton\n"), batch_),
                  std::nullopt);
-  for (const char* part : {"<td>serial number</td><td>66-70 &lt;b&gt;</td>", "AT960; 0.02 mm", "I. Newton"})
+  for (const char* part : {"<td>serial number</td><td>66-70 &lt;b&gt;</td>", "AT960, 0.02 mm", "I. Newton"})
     EXPECT_TRUE(has(page, part)) << part;
   EXPECT_TRUE(has(model_page(trained("none"), std::nullopt), "<td>serial number</td><td>not in the cell file</td>"));
 }

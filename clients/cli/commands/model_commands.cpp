@@ -23,6 +23,7 @@
 #include "server/error_sources/cause_words.h"
 #include "server/health/health_check.h"
 #include "server/measurement/gauges.h"
+#include "server/report/measured_json.h"
 #include "server/report/model_page.h"
 #include "server/report/note_json.h"
 #include "server/report/pages_beside.h"
@@ -273,7 +274,8 @@ Status evaluate(const EvaluateArguments& arguments) {
   const std::string structure = positions.measurements.empty() ? "" : structure_note(*model, positions, errors);
   const double stated = stated_coverage(*model, world->batch);
   tell(fmt::format("model {} on {} poses of {}:\n", model->provenance().id, rows_of(evaluation), batch->id()) +
-           evaluation_table(evaluation) + stated_coverage_line(stated) + located_text(*world) + learned_text(learned) +
+           evaluation_table(evaluation) + stated_coverage_line(stated) + "the model rests on " +
+           in_words(model->parts().measured, model->cell()) + "\n" + located_text(*world) + learned_text(learned) +
            (structure.empty() ? "" : "note: " + structure + "\n"),
        {arguments.json, arguments.residuals});
   if (!arguments.residuals.empty()) {
@@ -286,6 +288,7 @@ Status evaluate(const EvaluateArguments& arguments) {
   warn_of_foreign_poses(*model, world->batch);
   nlohmann::ordered_json json = evaluation_json(evaluation);
   json["coverage_95_stated"] = stated;
+  json["measured"] = measured_json(*model);
   json["notes"] = notes_json(notes);
   if (!structure.empty()) json["structure"] = structure;
   if (learned > 0) json["trained_on"] = learned;

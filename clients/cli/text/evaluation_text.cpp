@@ -10,6 +10,7 @@
 #include "server/error_sources/cause_words.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/report/figures_json.h"
+#include "server/report/measured_json.h"
 #include "server/report/note_json.h"
 #include "server/report/session_changes_json.h"
 
@@ -236,7 +237,7 @@ std::string provenance_text(const CompensatedModel& model) {
     text += fmt::format("{} identified anew on {} poses of batch {}, all else as in model {}\n",
                         causes_in_words(refit.sources), refit.poses, refit.batch_id, refit.model);
   }
-  return text;
+  return text + "it rests on " + in_words(parts.measured, model.cell()) + "\n";
 }
 
 std::string unidentifiable_text(const std::vector<UnidentifiableCombination>& combinations) {
@@ -376,6 +377,7 @@ ordered_json model_json(const CompensatedModel& model) {
   json["correlations"] = correlations_json(parts);
   json["parameters"] = parameters_json(parts.parameters);
   json["not_identifiable"] = unidentifiable_json(parts.unidentifiable);
+  json["measured"] = measured_json(model);
   json["training"] = evaluation_json(parts.training);
   json["notes"] = notes_json(notes_of(model));
   if (!parts.sessions.empty()) json["sessions"] = sessions_json(parts);

@@ -115,6 +115,21 @@ struct Parameter {
   bool identified = false;  ///< whether the poses say more of it than was known before
 };
 
+/// What the training poses of a model were: what it promises is about these.
+struct Measured {
+  std::string sentence;                     ///< all of it in words; where it is not on record, that
+  int poses = 0;                            ///< 0: not on record, in models from before it was recorded
+  std::vector<int> from_above;              ///< poses that each joint fell into
+  std::vector<int> from_below;              ///< poses that each joint rose into
+  std::optional<double> temperature_min_c;  ///< degrees Celsius; empty: not measured
+  std::optional<double> temperature_max_c;  ///< likewise
+  std::array<double, 3> lower_mm{};         ///< a corner of the box in B that the tool was in, mm
+  std::array<double, 3> upper_mm{};         ///< the opposite corner, mm
+  double volume_m3 = 0;                     ///< of the box, what is within reach of a place where the tool was
+  std::optional<double> reach_mm;           ///< mm: a pose farther from all measured places is out of domain
+  std::string instrument;                   ///< as the cell file names it, with its stated sigma
+};
+
 /// Nominal chain, identified error sources and learned bias.
 class TRAMMEL_API Model {
  public:
@@ -139,6 +154,8 @@ class TRAMMEL_API Model {
   [[nodiscard]] std::vector<double> parameter_covariance() const;
   /// Errors on poses held out from training, else on the training poses.
   [[nodiscard]] Evaluation figures() const;
+  /// What its promise is about.
+  [[nodiscard]] Measured measured() const;
   /// What a user of the model should know, the gravest first.
   [[nodiscard]] std::vector<Note> notes() const;
 

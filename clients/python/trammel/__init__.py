@@ -349,6 +349,11 @@ class Model:
         return self._inside.figures()
 
     @property
+    def measured(self) -> Dict[str, Any]:
+        """What its training poses were, as `measured` of `trammel train --json`: a promise is about these."""
+        return self._inside.measured()
+
+    @property
     def notes(self) -> List[Dict[str, Any]]:
         """What a user of the model should know, the gravest first: `code`, `severity` (`info`, `warning`, `stop`), `text`."""
         return self._inside.notes()

@@ -138,6 +138,19 @@ Status check_ranges(const ModelParts& parts) {
   return {};
 }
 
+Status check_measured(const ModelParts& parts) {
+  const WhatWasMeasured& measured = *parts.measured;
+  const auto joints = static_cast<std::size_t>(parts.physics.cell->robot.size());
+  if (measured.approaches.size() != joints)
+    return refused("model: measured: sides of approach of {} joints, its robot has {}", measured.approaches.size(),
+                   joints)
+        .of("measured")
+        .beyond(measured.approaches.size(), joints);
+  if ((measured.lower.array() > measured.upper.array()).any() || measured.reach.value_or(0) < 0)
+    return refused("model: measured: its volume ends before it begins").of("measured");
+  return {};
+}
+
 Status check_sessions(const ModelParts& parts) {
   for (const Change& change : parts.changes) {
     if (change.session >= parts.sessions.size())
@@ -161,6 +174,7 @@ Status check_parts(const ModelParts& parts) {
   if (fine) fine = check_size(parts.covariance, P);
   if (fine) fine = check_parameters(parts);
   if (fine) fine = check_ranges(parts);
+  if (fine && parts.measured) fine = check_measured(parts);
   if (fine) fine = check_sessions(parts);
   if (fine && parts.bias) fine = check_bias(*parts.bias);
   if (fine && parts.rotation_bias) fine = check_bias(*parts.rotation_bias);

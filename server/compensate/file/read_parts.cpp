@@ -216,9 +216,28 @@ Status read_calibration(const Json& content, const std::string& where, ModelPart
   return {};
 }
 
+WhatWasMeasured measured_from(const Json& json) {
+  WhatWasMeasured measured;
+  measured.poses = count_from(json, "poses");
+  for (const Json& one : list_from(json.at("approaches")))
+    measured.approaches.push_back({.rising = count_from(one, "rising"), .falling = count_from(one, "falling")});
+  measured.lower = vector3_from(json.at("lower_m"));
+  measured.upper = vector3_from(json.at("upper_m"));
+  measured.volume = number_from(json, "volume_m3");
+  const Eigen::MatrixXd places = matrix_from(json.at("flange_m"));
+  if (places.cols() != 3 || places.rows() < 1) wrong("expected places of the flange, three columns", json.at("poses"));
+  measured.flange_B = places.transpose();
+  measured.reach = number_if(json, "reach_m");
+  if (!json.contains("temperature_c")) return measured;
+  const Json& temperature = json.at("temperature_c");
+  measured.temperature = {number_from(temperature, "least"), number_from(temperature, "most")};
+  return measured;
+}
+
 void read_domain(const Json& content, ModelParts& parts) {
   parts.q_min = vector_from(content.at("q_min"));
   parts.q_max = vector_from(content.at("q_max"));
+  if (content.contains("measured")) parts.measured = measured_from(content.at("measured"));
   parts.prior_share_limit = number_from(content, "prior_share_limit");
   if (content.contains("bias_spread")) parts.bias_spread = number_from(content, "bias_spread");
   if (content.contains("extrapolation_slope")) {

@@ -195,10 +195,26 @@ void add_calibration(const ModelParts& parts, Json& content) {
   if (!parts.sessions_left_out.empty()) content["sessions_left_out"] = list_of(parts.sessions_left_out);
 }
 
+Json json_of(const WhatWasMeasured& measured) {
+  Json approaches = Json::array();
+  for (const auto& one : measured.approaches) approaches.push_back({{"rising", one.rising}, {"falling", one.falling}});
+  Json json = {{"poses", measured.poses},
+               {"approaches", std::move(approaches)},
+               {"lower_m", matrix_json(measured.lower)},
+               {"upper_m", matrix_json(measured.upper)},
+               {"volume_m3", measured.volume},
+               {"flange_m", matrix_json(measured.flange_B.transpose())}};
+  if (measured.temperature)
+    json["temperature_c"] = {{"least", measured.temperature->first}, {"most", measured.temperature->second}};
+  if (measured.reach) json["reach_m"] = *measured.reach;
+  return json;
+}
+
 /// Where the training poses lie.
 void add_domain(const ModelParts& parts, Json& content) {
   content["q_min"] = matrix_json(parts.q_min);
   content["q_max"] = matrix_json(parts.q_max);
+  if (parts.measured) content["measured"] = json_of(*parts.measured);
   content["prior_share_limit"] = parts.prior_share_limit;
   if (parts.bias_spread != 1) content["bias_spread"] = parts.bias_spread;
   content["trained_with"] = parts.trained_with;

@@ -57,8 +57,9 @@ void record_temperature(CompensatedModel::Parts& parts, const MeasurementBatch& 
   parts.temperature_stddev = std::sqrt((t - t.mean()).square().mean());
 }
 
-/// The joints' ranges where the model was trained.
+/// Where the model was trained: the joints' ranges, and what else a promise is about.
 void record_domain(CompensatedModel::Parts& parts, const MeasurementBatch& trained) {
+  parts.measured = what_was_measured(parts.physics, trained);
   parts.q_min = parts.q_max = trained.measurements.front().context.q;
   for (const Measurement& m : trained.measurements) {
     parts.q_min = parts.q_min.cwiseMin(m.context.q);

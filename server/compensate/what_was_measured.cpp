@@ -1,0 +1,193 @@
+#include "server/compensate/what_was_measured.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "server/base/units.h"
+#include "server/bias/pose_groups.h"
+#include "server/robot/cell_papers.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr double kNeighbour = 0.95;     // of the poses have their neighbour within the distance that counts
+constexpr double kBeyond = 1.5;         // times it: fresh poses lie between the measured ones, and a little outside
+constexpr double kFew = 4;              // among n poses the distance is known to 1 + 4/n
+constexpr double kLeastReach = 0.05;    // of the region's diagonal, where poses stand in clusters
+constexpr double kRounding = 1e-6;      // m
+constexpr Eigen::Index kPlaces = 2000;  // at most, evenly among the poses: each prediction looks at all of them
+constexpr int kCells = 24;              // of the box along each axis
+constexpr double kBothSides = 0.1;      // of the poses that say it come from the rarer side, or a joint has but one
+constexpr const char* kNotOnRecord = "not on record";
+
+double nearest(const Eigen::Matrix3Xd& places, const Vector3& place) {
+  return std::sqrt((places.colwise() - place).colwise().squaredNorm().minCoeff());
+}
+
+/// From each place to the nearest of the others, rising.
+std::vector<double> distances_to_neighbours(Eigen::Matrix3Xd places) {
+  std::vector<double> distances;
+  for (Eigen::Index i = 0; i < places.cols(); ++i) {
+    const Vector3 own = places.col(i);
+    places.col(i).setConstant(std::numeric_limits<double>::infinity());
+    distances.push_back(nearest(places, own));
+    places.col(i) = own;
+  }
+  std::sort(distances.begin(), distances.end());
+  return distances;
+}
+
+std::optional<double> reach_of(const Eigen::Matrix3Xd& places) {
+  if (places.cols() < 2) return std::nullopt;
+  const std::vector<double> distances = distances_to_neighbours(places);
+  const auto at = static_cast<std::size_t>(kNeighbour * static_cast<double>(distances.size() - 1));
+  const double diagonal = (places.rowwise().maxCoeff() - places.rowwise().minCoeff()).norm();
+  const double few = 1 + kFew / static_cast<double>(places.cols());
+  return std::max(kBeyond * few * distances[at], kLeastReach * diagonal) + kRounding;
+}
+
+/// One row of each joint vector, evenly chosen where there are too many.
+std::vector<Eigen::Index> rows_to_keep(const MeasurementBatch& batch) {
+  const auto n = static_cast<Eigen::Index>(batch.measurements.size());
+  Eigen::MatrixXd q(n, batch.measurements.front().context.q.size());
+  for (Eigen::Index i = 0; i < n; ++i) q.row(i) = batch.measurements[static_cast<std::size_t>(i)].context.q.transpose();
+  const std::vector<PoseGroup> groups = pose_groups(q);
+  const std::size_t step = groups.size() / static_cast<std::size_t>(kPlaces) + 1;
+  std::vector<Eigen::Index> rows;
+  for (std::size_t g = 0; g < groups.size(); g += step) rows.push_back(groups[g].front());
+  return rows;
+}
+
+/// m³ of the box within `reach` of a place.
+double volume_near(const Eigen::Matrix3Xd& places, const Vector3& lower, const Vector3& upper, double reach) {
+  const Vector3 cell = (upper - lower) / kCells;
+  int near = 0;
+  for (int i = 0; i < kCells * kCells * kCells; ++i) {
+    const Vector3 middle(i % kCells + 0.5, i / kCells % kCells + 0.5, i / (kCells * kCells) + 0.5);
+    near += nearest(places, lower + cell.cwiseProduct(middle)) <= reach ? 1 : 0;
+  }
+  return near * cell.prod();
+}
+
+void count_sides(const PoseContext& context, std::vector<WhatWasMeasured::Approaches>& approaches) {
+  for (std::size_t j = 0; j < context.direction.size(); ++j) {
+    approaches[j].rising += context.direction[j] > 0 ? 1 : 0;
+    approaches[j].falling += context.direction[j] < 0 ? 1 : 0;
+  }
+}
+
+void widen(const std::optional<double>& by, std::optional<std::pair<double, double>>& range) {
+  if (!by) return;
+  if (!range) range = {*by, *by};
+  range = {std::min(range->first, *by), std::max(range->second, *by)};
+}
+
+enum class Side { kUnknown, kBoth, kAbove, kBelow };
+
+Side side_of(const WhatWasMeasured::Approaches& one) {
+  const auto [rarer, other] = std::minmax(one.rising, one.falling);
+  if (other == 0) return Side::kUnknown;
+  if (rarer >= kBothSides * (rarer + other)) return Side::kBoth;
+  return one.rising > one.falling ? Side::kBelow : Side::kAbove;
+}
+
+/// The joints of a side: ` in joints 1 2`; empty where it is all of them.
+std::optional<std::string> joints_of(const WhatWasMeasured& measured, Side side) {
+  std::vector<std::size_t> joints;
+  for (std::size_t j = 0; j < measured.approaches.size(); ++j)
+    if (side_of(measured.approaches[j]) == side) joints.push_back(j + 1);
+  if (joints.empty()) return std::nullopt;
+  if (joints.size() == measured.approaches.size()) return "";
+  return fmt::format(" in joint{} {}", joints.size() == 1 ? "" : "s", fmt::join(joints, " "));
+}
+
+/// `from both sides in joints 1 2, from above in joint 3`, of these sides; `every` begins what holds for all joints.
+std::string sides_text(const WhatWasMeasured& measured, const std::vector<std::pair<Side, const char*>>& sides,
+                       const char* every) {
+  std::string text;
+  for (const auto& [side, name] : sides) {
+    const auto joints = joints_of(measured, side);
+    if (joints) text += (text.empty() ? "" : ", ") + (joints->empty() ? every + std::string(name) : name + *joints);
+  }
+  return text;
+}
+
+std::string volume_text(const WhatWasMeasured& measured) {
+  std::string text;
+  for (int k = 0; k < 3; ++k)
+    text += fmt::format("{}{} {:.0f} to {:.0f}", k == 0 ? "" : ", ", "xyz"[k], to_mm(measured.lower(k)),
+                        to_mm(measured.upper(k)));
+  text += " mm of the tool from the robot's base";
+  if (!measured.reach) return text;
+  return text + fmt::format(", {:.3g} of these {:.3g} m³ within {:.0f} mm of a measured place", measured.volume,
+                            (measured.upper - measured.lower).prod(), to_mm(*measured.reach));
+}
+
+}  // namespace
+
+bool WhatWasMeasured::is_near(const Chain& robot, const JointVector& q) const {
+  return !reach || nearest(flange_B, robot.flange_pose(q).translation()) <= *reach;
+}
+
+WhatWasMeasured what_was_measured(const PhysicalModel& physics, const MeasurementBatch& batch) {
+  WhatWasMeasured measured;
+  measured.poses = static_cast<int>(batch.measurements.size());
+  measured.approaches.resize(static_cast<std::size_t>(physics.cell->robot.size()));
+  const Pose X_BW = physics.X_WB.inverse();
+  Eigen::Matrix3Xd tool_B(3, measured.poses);
+  for (Eigen::Index i = 0; i < tool_B.cols(); ++i) {
+    const PoseContext& context = batch.measurements[static_cast<std::size_t>(i)].context;
+    tool_B.col(i) = X_BW * physics.nominal_pose_W(context).translation();
+    count_sides(context, measured.approaches);
+    widen(context.temperature, measured.temperature);
+  }
+  measured.lower = tool_B.rowwise().minCoeff();
+  measured.upper = tool_B.rowwise().maxCoeff();
+  const std::vector<Eigen::Index> rows = rows_to_keep(batch);
+  measured.flange_B.resize(3, static_cast<Eigen::Index>(rows.size()));
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const JointVector& q = batch.measurements[static_cast<std::size_t>(rows[k])].context.q;
+    measured.flange_B.col(static_cast<Eigen::Index>(k)) = physics.cell->robot.flange_pose(q).translation();
+  }
+  measured.reach = reach_of(measured.flange_B);
+  if (measured.reach)
+    measured.volume = volume_near(tool_B(Eigen::all, rows), measured.lower, measured.upper, *measured.reach);
+  return measured;
+}
+
+std::string one_sided(const std::optional<WhatWasMeasured>& measured) {
+  return measured ? sides_text(*measured, {{Side::kAbove, "from above"}, {Side::kBelow, "from below"}}, "") : "";
+}
+
+MeasuredWords words_of(const std::optional<WhatWasMeasured>& measured, const Cell& cell) {
+  const std::string instrument = papers_of(cell).value_or(CellPapers{}).instrument;
+  MeasuredWords words{kNotOnRecord, kNotOnRecord, kNotOnRecord,
+                      fmt::format("{}, {:.4g} mm (1 sigma, per axis) as stated",
+                                  instrument.empty() ? "an instrument that the cell file does not name" : instrument,
+                                  to_mm(cell.tracker.sigma))};
+  if (!measured) return words;
+  words.sides = sides_text(*measured,
+                           {{Side::kBoth, "from both sides"},
+                            {Side::kAbove, "from above only"},
+                            {Side::kBelow, "from below only"},
+                            {Side::kUnknown, "from a side that is not recorded"}},
+                           "every joint ");
+  words.temperature = !measured->temperature ? "not measured"
+                                             : fmt::format("{:.1f} to {:.1f} degrees Celsius",
+                                                           measured->temperature->first, measured->temperature->second);
+  words.volume = volume_text(*measured);
+  return words;
+}
+
+std::string in_words(const std::optional<WhatWasMeasured>& measured, const Cell& cell) {
+  const MeasuredWords words = words_of(measured, cell);
+  const std::string poses = measured
+                                ? fmt::format("{} training pose{}", measured->poses, measured->poses == 1 ? "" : "s")
+                                : std::string("training poses of which the model tells little");
+  return fmt::format("{}; sides of approach: {}; temperature: {}; volume: {}; instrument: {}", poses, words.sides,
+                     words.temperature, words.volume, words.instrument);
+}
+
+}  // namespace trammel

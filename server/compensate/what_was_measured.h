@@ -1,0 +1,54 @@
+#pragma once
+
+#include <Eigen/Dense>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/error_sources/physical_model.h"
+#include "server/measurement/measurement.h"
+
+/// What a model's training poses were, as far as what it promises is about them.
+namespace trammel {
+
+struct WhatWasMeasured {
+  /// Poses that a joint rose into and fell into; the others do not say.
+  struct Approaches {
+    int rising = 0, falling = 0;
+  };
+  int poses = 0;
+  std::vector<Approaches> approaches;                        ///< of each joint
+  std::optional<std::pair<double, double>> temperature;      ///< degrees Celsius, least and most; empty: not recorded
+  Vector3 lower = Vector3::Zero(), upper = Vector3::Zero();  ///< corners of a box in B that the tool was in, m
+  double volume = 0;          ///< m³: the part of the box within `reach` of a place where the tool was
+  Eigen::Matrix3Xd flange_B;  ///< places of the nominal flange, m
+  /// m: a pose whose flange is farther from all of them is another region of the robot. Empty where one joint vector
+  /// was measured, which tells no distance.
+  std::optional<double> reach;
+
+  /// Whether the nominal flange at `q` is within reach of a place where it was measured.
+  [[nodiscard]] bool is_near(const Chain& robot, const JointVector& q) const;
+};
+
+/// Of the poses of `batch`, which `physics` knows the tools of. `reach` follows the distances between the poses
+/// themselves: 1.5 times that within which 95 % of them have a neighbour, more where they are few, and no less than a
+/// twentieth of the region. What stands at one joint vector is one place and no neighbour of itself.
+[[nodiscard]] WhatWasMeasured what_was_measured(const PhysicalModel& physics, const MeasurementBatch& batch);
+
+/// The same for people, each part by itself. Of a model without it, parts are `not on record`.
+struct MeasuredWords {
+  std::string sides;        ///< `every joint from both sides`
+  std::string temperature;  ///< `20.0 to 23.5 degrees Celsius`
+  std::string volume;       ///< `x 600 to 1200, y ... mm of the tool from the robot's base, ...`
+  std::string instrument;   ///< `laser tracker 17, 0.015 mm (1 sigma, per axis) as stated`
+};
+[[nodiscard]] MeasuredWords words_of(const std::optional<WhatWasMeasured>& measured, const Cell& cell);
+/// All of it: `80 training poses; sides of approach: every joint from both sides; ...`
+[[nodiscard]] std::string in_words(const std::optional<WhatWasMeasured>& measured, const Cell& cell);
+
+/// `from above`, `from above in joints 1 2, from below in joint 3`: of joints that came to nearly all poses from one
+/// side. Empty where there is none.
+[[nodiscard]] std::string one_sided(const std::optional<WhatWasMeasured>& measured);
+
+}  // namespace trammel
