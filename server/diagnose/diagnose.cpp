@@ -18,6 +18,7 @@
 #include "server/diagnose/tell/more_than_noise.h"
 #include "server/diagnose/tell/row_mistakes.h"
 #include "server/diagnose/tell/wording.h"
+#include "server/error_sources/spelling.h"
 #include "server/measurement/gauges.h"
 #include "server/measurement/sessions.h"
 
@@ -37,6 +38,17 @@ struct Placed {
   [[nodiscard]] const std::vector<SessionSetting>& sessions() const { return calibration.sessions; }
 };
 
+/// The cell's sources, and play of every joint that was approached from both sides: sessions that came from different
+/// sides differ by it, and nothing changed between them.
+std::vector<std::string> sources_with_play(const Cell& cell, const MeasurementBatch& batch) {
+  std::vector<std::string> sources = spelled_out(with_unknown_tool(cell.model.error_sources, cell), cell);
+  for (const std::string& source : candidate_sources(cell, batch, nullptr)) {
+    const bool is_play = cause_spelled(source).search == causes::SearchFamily::kPlay;
+    if (is_play && std::find(sources.begin(), sources.end(), source) == sources.end()) sources.push_back(source);
+  }
+  return sources;
+}
+
 /// By the arm as the cell's sources have it, and what changed on it between two sessions: what a change does is no
 /// noise of the sessions after it.
 Result<Placed> placed(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
@@ -47,7 +59,7 @@ Result<Placed> placed(const std::shared_ptr<const Cell>& cell, const CheckedBatc
     return calibrate(cell, sources, merged, {});
   };
   return identify_sessions(
-             identify, with_unknown_tool(cell->model.error_sources, *cell), merged,
+             identify, sources_with_play(*cell, merged), merged,
              [&](double) { return report_progress(options, "asking what changed between the sessions", 0); })
       .map([&](IdentifiedSessions found) {
         return Placed{std::move(found.calibration), std::move(found.changes), !batch.rows().clock};
