@@ -771,7 +771,8 @@ TEST_F(TrainerTest, ABatchStaysInQuarantineWhereItsModelIsJudgedAndFoundNotBette
   EXPECT_FALSE(done.in_force) << done.what;
   EXPECT_NE(done.what.find("lt-08 stays there"), std::string::npos) << done.what;
   EXPECT_EQ(trainer_->quarantined("")->size(), 1u);
-  ASSERT_TRUE(trainer_->activate("cell-7", done.model_version)) << "a person may know better";
+  ASSERT_FALSE(trainer_->activate("cell-7", done.model_version)) << "it is worse on what was measured";
+  ASSERT_TRUE(trainer_->activate("cell-7", done.model_version, {}, true)) << "a person may know better";
   EXPECT_TRUE(trainer_->quarantined("")->empty());
 }
 

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::chrono::seconds kLimit{60};
 
-/// A place that whoever comes by waits at while it is shut.
+/// A place that the first who comes by while it is shut waits at.
 class Gate {
  public:
   void shut() {
@@ -36,7 +36,7 @@ class Gate {
   void pass() {
     std::unique_lock lock(mutex_);
     ++passed_;
-    if (!shut_) return;
+    if (!shut_ || waiting_ > 0) return;
     ++waiting_;
     changed_.notify_all();
     changed_.wait(lock, [this] { return !shut_; });
