@@ -182,12 +182,12 @@ class Examination {
   [[nodiscard]] double price(int numbers) const {
     return std::log(static_cast<double>(rows_.residual.size())) * numbers;
   }
-  /// Whether a single cause, or the bad poses that were found, explain as much for their numbers.
+  /// True where a single cause, or the bad poses that were found, explain as much for their numbers.
   [[nodiscard]] bool has_simpler(const CheckTests& tests, const Eigen::VectorXd& left, double score);
   void tell_zeros(const ZerosFit& fit);
   void tell_tool_beside(const ZerosFit& fit, const CheckRows& there);
   void tell_other_sets(const ZerosFit& fit, SeenChange& change) const;
-  /// What explains as much as the cause does beside `others`.
+  /// Adds the causes that explain as much as this one does beside `others`.
   void tell_rivals_beside(const CheckRows& there, const Eigen::MatrixXd& others, std::size_t cause,
                           SeenChange& change) const;
   /// Several zeros that explain as much as what was named does.
@@ -213,7 +213,7 @@ class Examination {
   [[nodiscard]] Estimate estimated(std::size_t hypothesis, const RefittedRows& refitted) const;
   /// Over the working poses.
   [[nodiscard]] Size size(std::size_t hypothesis, const Estimate& found) const;
-  /// What these columns do at the check's poses: k x k, m².
+  /// The squared effect of these columns at the check's poses: k x k, m².
   [[nodiscard]] Eigen::MatrixXd square_here(const Eigen::MatrixXd& columns, const RefittedRows& refitted) const;
   /// `over`, or where it is more than the poses are off by, what they show of it.
   void set_size(const Size& over, const Estimate& found, const Eigen::MatrixXd& here, SeenChange& change) const;
@@ -253,7 +253,7 @@ class Examination {
   HealthCheck check_;
 };
 
-/// Of what numbers do whose squared effect is w' `square` w.
+/// The size of an effect of numbers w whose square is w' `square` w.
 Size size_of(const Estimate& found, const Eigen::MatrixXd& square) {
   const double whole = found.numbers.dot(square * found.numbers);
   const double by_noise = (square * found.covariance).trace();
@@ -261,7 +261,7 @@ Size size_of(const Estimate& found, const Eigen::MatrixXd& square) {
   return {std::sqrt(std::max(whole - by_noise, 0.0)), 2 * std::sqrt(gradient.dot(found.covariance * gradient))};
 }
 
-/// Of a joint's angle that is off by anything at each pose, each of `rms` where it is off by one prior scale.
+/// The size where a joint's angle is off by anything at each pose; `rms`: if it is one prior scale everywhere.
 Size size_of_any(const Estimate& found, double rms) {
   const auto poses = static_cast<double>(found.numbers.size());
   const double by_noise = found.covariance.trace() / poses;
@@ -286,7 +286,7 @@ void Examination::look_for_changes(const CheckTests& healthy) {
   if (!named_.empty()) tell_what_is_left();
 }
 
-/// What was named is not all, or not the only way to say it.
+/// Adds to each change that several zeros explain as much, and that something is left beside all of them.
 void Examination::tell_what_is_left() {
   const CheckTests tests(covariance_, nuisance_, questions_);
   const bool is_all = tests.smallest_p(tests.rows().left(rows_.residual)) >= healthy_.limit(options_.false_alarm);
@@ -488,7 +488,7 @@ std::optional<std::size_t> Examination::likeliest(const CheckTests& tests, const
   return std::nullopt;
 }
 
-/// What takes any form fits nearly anything in part: it is named where it is all.
+/// A cause of any form fits nearly anything in part, so it is named only where nothing is left.
 bool Examination::may_be_named(std::size_t hypothesis, const CheckTests& tests, const Eigen::VectorXd& left) const {
   if (!effects_.causes()[questions_.hypotheses[hypothesis].cause].cause.any_function) return true;
   const int freedom = tests.rows().freedom() - tests.freedom(hypothesis);
@@ -791,6 +791,11 @@ void Examination::tell_verdict() {
   } else if (!check_.changed.empty()) {
     check_.verdict = HealthVerdict::kChanged;
     check_.sentence = "the robot is not as its model has it; " + seen_in_words();
+    const bool is_sure = std::all_of(check_.changed.begin(), check_.changed.end(), [](const SeenChange& change) {
+      return change.could_also_be.empty() && change.cause.record != unknown_cause().record;
+    });
+    if (!is_sure)
+      check_.sentence += fmt::format("; `trammel plan --check {}` chooses poses that tell more", 2 * check_.poses);
   } else if (check_.p_value < kDoubtful) {
     check_.sentence = fmt::format(
         "these poses are less like the model than {:.1f} % of healthy checks are, which may be chance: measure again",

@@ -84,9 +84,9 @@ struct HealthCheck {
 /// and everything together. The limit on their p-values is the one that the smallest of them stays above in
 /// 1 - `false_alarm` of simulated healthy checks at these very poses.
 ///
-/// What is beyond it is looked for among zeros that several joints lost at once first, with or without a tool that
-/// sits elsewhere; then among single causes, one after the other. An error of any form over a joint's angle is named
-/// only where it leaves nothing beyond chance. What explains as much as what is named stands beside it.
+/// Where a check is beyond that limit, zeros that several joints lost at once are tried first, with or without a tool
+/// that sits elsewhere; then single causes, one after the other. An error of any form over a joint's angle is named
+/// only where it leaves nothing beyond chance. Causes that explain as much as a named one stand beside it.
 [[nodiscard]] Result<HealthCheck> check_health(const CompensatedModel& model, const CheckedBatch& batch,
                                                const HealthOptions& options);
 

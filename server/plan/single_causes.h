@@ -54,7 +54,7 @@ class CauseEffects {
   [[nodiscard]] const std::vector<Eigen::Index>& tool_columns() const { return tool_; }
   /// Number of columns, K.
   [[nodiscard]] Eigen::Index size() const { return static_cast<Eigen::Index>(numbers_.size()); }
-  /// Of each column, SI.
+  /// The prior scale of a column, SI.
   [[nodiscard]] double scale(Eigen::Index column) const { return scale_(column); }
   /// At the values of the model.
   [[nodiscard]] PoseEffects at(const PoseContext& context) const;

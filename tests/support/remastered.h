@@ -19,9 +19,9 @@ struct Remastered {
 
 /// The joints of lost zeros, 1-based.
 [[nodiscard]] std::vector<int> joints_of(const std::vector<LostZero>& zeros);
-/// Whether all that is named has changed.
+/// True where all that is named has changed.
 [[nodiscard]] bool is_right(const HealthCheck& check, const Remastered& truth);
-/// Whether something is named, and nothing beside it.
+/// True where something is named, and nothing beside it.
 [[nodiscard]] bool is_sure(const HealthCheck& check);
 
 }  // namespace trammel::test

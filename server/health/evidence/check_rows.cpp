@@ -53,7 +53,7 @@ Result<Pose> located(const MeasurementBatch& batch, const std::vector<ErrorPredi
   return X_WB;
 }
 
-/// Whether all poses are at about one place, or on one line: an error of theirs turns the base as it likes.
+/// True where all poses are at about one place, or on one line: any error of theirs turns the base.
 bool are_thin(const std::vector<ErrorPrediction>& predictions) {
   Eigen::Matrix3Xd p_B(3, static_cast<Index>(predictions.size()));
   for (std::size_t i = 0; i < predictions.size(); ++i)

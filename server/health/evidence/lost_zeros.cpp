@@ -36,7 +36,7 @@ ZerosSearch::Linear ZerosSearch::linear(const VectorXd& at, const Pose& X_BB) co
     const PoseEffects there = effects_.at(rows_.contexts[i], at);
     now.by_base.middleRows(first, count) = there.by_base.topRows(count);
     now.by_cause.middleRows(first, count) = there.by_cause.topRows(count);
-    // What the model has beside its physics moves with the arm.
+    // The model's bias moves with the arm.
     const Pose& was = rows_.predicted[i];
     const Vector3 p_B = was.translation() + there.X_BT.translation() - physics_[i].translation();
     const Vector3 measured_B = X_BB.inverse() * (was.translation() + rows_.residual.segment<3>(first));

@@ -7,11 +7,11 @@
 /// Zeros that several joints lost at once, as in a robot that was mastered anew, and beside them perhaps a tool that
 /// sits elsewhere: one explanation of a check.
 ///
-/// A zero that is off by degrees does not act linearly: base, zeros and tool are found together by Gauss and Newton.
-/// Each number has a prior of what it can be at all, which bounds what the poses do not tell.
+/// A zero that is off by degrees does not act linearly: base, zeros and tool are found together by Gauss-Newton steps.
+/// Each number has a prior width, the most that it can be off; it bounds what the poses do not tell.
 namespace trammel::health {
 
-/// What these zeros, and the tool, explain.
+/// One set of zeros, with or without the tool, as the poses have it.
 struct ZerosFit {
   std::vector<std::size_t> zeros;  ///< indices in CauseEffects::causes(), ascending
   bool tool = false;               ///< sits elsewhere as well
