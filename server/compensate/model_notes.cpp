@@ -8,6 +8,7 @@
 #include "server/compensate/paired_gain.h"
 #include "server/compensate/session_changes.h"
 #include "server/error_sources/anchors.h"
+#include "server/measurement/computed_positions.h"
 #include "server/robot/cell_doubts.h"
 #include "server/robot/gauge.h"
 #include "server/robot/robot_confirmation.h"
@@ -236,6 +237,13 @@ void add_left_over(const CompensatedModel::Parts& parts, std::vector<Note>& note
                    times, to_mm(worst.left), to_mm(worst.stated))});
 }
 
+/// The drawing knows no number of the batch, so nothing can make its errors small.
+void add_computed_positions(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
+  const Evaluation& training = parts.training;
+  if (auto text = computed_not_measured(training.nominal.rms, parts.physics.cell->tracker.sigma, training.poses))
+    notes.push_back({"computed_positions", Severity::kStop, *std::move(text)});
+}
+
 /// `3, 8, 11 and 4 more`
 std::string rows_of(const std::vector<SuspectPose>& suspects) {
   constexpr std::size_t kMost = 40;
@@ -358,6 +366,7 @@ std::vector<Note> notes_of(const CompensatedModel& model) {
   add_what_data_added(model.parts(), notes);
   add_idle_sources(model.parts(), notes);
   add_left_over(model.parts(), notes);
+  add_computed_positions(model.parts(), notes);
   add_suspects(model.parts(), notes);
   add_untold_turn(model.parts(), notes);
   add_sides(model.parts(), notes);

@@ -128,6 +128,21 @@ TEST(ModelNotes, WhatIsLeftOfDistancesAndTouchesIsHeldAgainstTheStatedSigma) {
   EXPECT_EQ(left(500).front().severity, Note::Severity::kStop);
 }
 
+TEST(ModelNotes, PositionsThatTheDrawingHasBetterThanTheInstrumentMeasuresWereComputed) {
+  const auto codes = [](double times, int poses) {
+    CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
+    parts.training.poses = poses;
+    parts.training.nominal.rms = times * std::sqrt(3.0) * parts.physics.cell->tracker.sigma;
+    std::vector<Note> notes = notes_of(test::demand(CompensatedModel::make(parts)));
+    std::erase_if(notes, [](const Note& note) { return note.code != "computed_positions"; });
+    return notes;
+  };
+  ASSERT_EQ(codes(0.02, 60).size(), 1U);
+  EXPECT_EQ(codes(0.02, 60).front().severity, Note::Severity::kStop);
+  EXPECT_TRUE(codes(1.0, 60).empty()) << "a robot as good as its drawing, measured";
+  EXPECT_TRUE(codes(0.02, 3).empty());
+}
+
 TEST(ModelNotes, RowsThatFitNothingAreNamedAndManyOfThemWaitForAPerson) {
   CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
   parts.provenance.training_poses = 42;

@@ -106,6 +106,16 @@ TEST(Wording, CallsNoiseOnlyWhatTheInstrumentMayDo) {
             "More than noise is left: 4 times. No single joint, torque or time was found with which it changes.");
 }
 
+TEST(Wording, SaysThatPositionsWereComputedWhereTheyAreBetterThanTheInstrument) {
+  Diagnosis log = with({});
+  log.poses = 60;
+  log.instrument = 30e-6;
+  log.before.rms = log.after.rms = 0.5e-6;
+  const std::string sentence = sentence_for(log);
+  EXPECT_NE(sentence.find("computed, not measured"), std::string::npos) << sentence;
+  EXPECT_EQ(sentence.find("noise"), std::string::npos) << sentence;
+}
+
 TEST(Wording, KnowsWhatWasLookedForByTheOrderOfThePoses) {
   const Unseen growth = {kWarm, 0, {}, {}, "temperatures"};
   EXPECT_TRUE(is_looked_for_by_order(growth, with_temperatures(false)));

@@ -5,6 +5,7 @@
 #include "server/base/units.h"
 #include "server/diagnose/search/surrogates.h"
 #include "server/diagnose/thresholds.h"
+#include "server/measurement/computed_positions.h"
 #include "server/plan/separation.h"
 
 namespace trammel {
@@ -242,9 +243,12 @@ std::string sentence_for(const Diagnosis& d) {
   add(d.unexplained.hint);
   if (d.unexplained.present && d.unexplained.depends_on.empty()) add(what_it_changes_with({}));
   add(held_out_said(d.suspects));
-  if (!found && !d.unexplained.present)
-    add(fmt::format("Nothing {} found in {} poses: {:.0f} um rms are left, which looks like noise",
-                    all.bad_poses.empty() ? "was" : "else was", d.poses, 1e6 * d.after.rms));
+  if (!found && !d.unexplained.present) {
+    const std::string nothing =
+        fmt::format("Nothing {} found in {} poses: ", all.bad_poses.empty() ? "was" : "else was", d.poses);
+    const auto computed = computed_not_measured(d.before.rms, d.instrument, d.poses);
+    add(nothing + computed.value_or(fmt::format("{:.0f} um rms are left, which looks like noise", 1e6 * d.after.rms)));
+  }
   add(advice_said(d));
   return text;
 }

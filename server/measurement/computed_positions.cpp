@@ -1,0 +1,22 @@
+#include "server/measurement/computed_positions.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "server/base/units.h"
+
+namespace trammel {
+
+std::optional<std::string> computed_not_measured(double rms, double sigma, int poses) {
+  constexpr double kTooGood = 0.2;  // of the stated sigma, which may be several times too large
+  constexpr int kEnoughPoses = 10;  // so many are no chance, and no fit of an arm takes them all up
+  const double left = rms / std::sqrt(3.0);
+  if (poses < kEnoughPoses || !(left < kTooGood * sigma)) return std::nullopt;
+  return fmt::format(
+      "the positions are the model's to {:.4f} mm, and the instrument is said to measure to {:.3f} mm: these positions "
+      "were computed, not measured",
+      to_mm(rms), to_mm(sigma));
+}
+
+}  // namespace trammel
