@@ -248,7 +248,7 @@ class GateDescriptor final : public rtps::ChainingTransportDescriptor {
         relays(std::move(believed)) {}
 
   rtps::TransportInterface* create_transport() const override { return new Gate(*this); }
-  /// Of what is sent. The transport below receives what it is configured for itself.
+  /// A datagram that is sent has no more. The transport below receives what it is configured for itself.
   std::uint32_t max_message_size() const override {
     return std::min(options.largest_sent, ChainingTransportDescriptor::max_message_size());
   }

@@ -34,9 +34,9 @@ class Guard {
                                            Time now = std::chrono::steady_clock::now());
   /// A message of our own that leaves.
   void sent(Bytes message);
-  /// Whether lets_out() may be false of any socket.
+  /// If false, lets_out() is true of every socket.
   [[nodiscard]] bool knows_strangers() const { return memory_.knows_strangers; }
-  /// Whether a datagram may leave for that socket; one that only strangers name gets a few.
+  /// If true, a datagram may leave for that socket. One that only strangers name gets a few.
   [[nodiscard]] bool lets_out(std::uint64_t socket, Time now = std::chrono::steady_clock::now());
 
   [[nodiscard]] const DropCounts& counts() const { return *counts_; }

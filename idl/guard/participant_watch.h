@@ -42,7 +42,7 @@ class ParticipantWatch {
   void left(Bytes prefix);
 
   [[nodiscard]] bool knows_strangers() const { return !strangers_.empty(); }
-  /// Whether a datagram may be sent there: not without end where a stranger alone says that it listens.
+  /// If true, a datagram may be sent there: not without end where a stranger alone says that it listens.
   [[nodiscard]] bool lets_out(std::uint64_t socket, Time now);
 
  private:

@@ -23,7 +23,7 @@ struct CellAtStart {
   std::string why = {};
 };
 
-/// Of every cell, by name, from the store at `path` and the copies beside it, which are only read, also while a service
+/// Every cell, by name, from the store at `path` and the copies beside it, which are only read, also while a service
 /// runs on them: whether this program can read the model in force, and whether it fits the cell as its file is now.
 [[nodiscard]] Result<std::vector<CellAtStart>> cells_at_start(const std::string& path, const ServedCells& cells);
 

@@ -218,7 +218,7 @@ TEST(Guard, WhatNobodyNeedsOfAnAnnouncementIsBlanked) {
   }
 }
 
-/// What of the announcement of kSource the library sees.
+/// The message of kSource as the library sees it; empty: not at all.
 PacketBytes let_in(Guard& guard, const PacketBytes& message, Guard::Time now = std::chrono::steady_clock::now()) {
   const auto passed = guard.check(message, kSocket, now);
   return passed ? PacketBytes(passed->begin(), passed->end()) : PacketBytes();

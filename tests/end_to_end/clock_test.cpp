@@ -43,7 +43,7 @@ class ClockTest : public testing::Test {
   [[nodiscard]] std::unique_ptr<client::Session> client() const {
     return std::move(client::Session::open(daemon_.session_options()).value());
   }
-  /// What the only server says that it cannot do, once that is `wanted` or nothing.
+  /// The trouble that the only server tells, once it holds `wanted` (empty: once there is none).
   [[nodiscard]] std::string trouble(client::Session& session, const std::string& wanted) const {
     const auto servers = demand(session.servers_when(
         [&](const std::vector<client::ServerStatus>& all) {
