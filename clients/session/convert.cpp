@@ -177,7 +177,7 @@ wire::Target to_wire(const TargetMm& target) {
 
 Note from_wire(const wire::Note& note) {
   constexpr Note::Severity kSeverities[] = {Note::Severity::kInfo, Note::Severity::kWarning, Note::Severity::kStop};
-  return {note.code(), kSeverities[note.severity()], note.text()};
+  return {note.code().to_string(), kSeverities[note.severity()], note.text()};
 }
 
 ModelInfo from_wire(const wire::ModelInfo& info) {

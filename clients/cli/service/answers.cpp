@@ -11,6 +11,7 @@
 #include "server/base/units.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/measurement/pose_columns.h"
+#include "server/report/note_json.h"
 
 namespace trammel::cli {
 
