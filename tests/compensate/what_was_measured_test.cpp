@@ -112,7 +112,8 @@ double share_near(const std::shared_ptr<const Cell>& cell, int poses, std::uint6
   const WhatWasMeasured measured = what_was_measured(physics, test::measured(robot, poses, seed));
   const Eigen::MatrixXd fresh = demand(plan_poses(*cell, {1000, seed + 100}));
   int near = 0;
-  for (const auto& q : fresh.rowwise()) near += measured.is_near(cell->robot, q.transpose()) ? 1 : 0;
+  for (Eigen::Index i = 0; i < fresh.rows(); ++i)
+    near += measured.is_near(cell->robot, fresh.row(i).transpose()) ? 1 : 0;
   return near / 1000.0;
 }
 
@@ -131,8 +132,9 @@ std::vector<JointVector> behind(const CompensatedModel& model, double by) {
   JointRanges ranges;
   for (Eigen::Index j = 0; j < 6; ++j) ranges.emplace_back(model.parts().q_min(j), model.parts().q_max(j));
   std::vector<JointVector> poses;
-  for (const auto& row : latin_hypercube(ranges, 4000, 9).rowwise()) {
-    const JointVector q = row.transpose();
+  const Eigen::MatrixXd all = latin_hypercube(ranges, 4000, 9);
+  for (Eigen::Index i = 0; i < all.rows(); ++i) {
+    const JointVector q = all.row(i).transpose();
     if (model.cell().robot.flange_pose(q).translation().x() < -by) poses.push_back(q);
   }
   return poses;
