@@ -59,7 +59,7 @@ TEST(Approach, TheGearsComeFromOneSideWhateverTheControllerCounts) {
     ASSERT_TRUE(coupled);
     const JointVector q = JointVector::Constant(6, 0.1);
     for (const int direction : {1, -1}) {
-      const JointVector move = q - *bump_pose(*coupled, q, direction);
+      const JointVector move = q - *bump_pose(*coupled, q, Sides(6, direction));
       EXPECT_NEAR(move(1), direction * from_deg(5), 1e-12);
       EXPECT_NEAR(move(2) + ratio * move(1), direction * from_deg(5), 1e-12) << "what the gear of joint 3 turns";
     }
