@@ -82,7 +82,8 @@ std::vector<std::pair<Dialect, std::vector<SourceFile>>> programs_in_the_world()
          "1,0,0,0,0,0,0,0\r\nC00000=" +
              angles + "\r\n//INST\r\n///GROUP1 RB1\r\nNOP\r\nMOVL C00000 V=100.0\r\nEND\r\n"}}},
       {Dialect::kUrScript,
-       {{"p.script", fmt::format("def p():\n  set_tcp(p[0.1, 0, 0.15, 0, -0.785398163, 0])\n  movel(p[0.0, 1.8, 1.6, "
+       {{"p.script", fmt::format("def p():\n  set_tcp(p[0.1, 0, 0.15, 0, -0.785398163, 0])\n  movej([0, -0.35, 0.35, "
+                                 "0, 0.5, 0])\n  movel(p[0.0, 1.8, 1.6, "
                                  "{:.9f}, {:.9f}, {:.9f}], a=1, v=0.1)\nend\n",
                                  w.x(), w.y(), w.z())}}},
       {Dialect::kCamRob, {{"p.csv", "1;0.0;1800.0;1600.0;90.0;60.0;0.0;1;25.0\n"}}},
@@ -97,8 +98,8 @@ TEST(RobotBase, ARowOfFramesStandsTheRobotInEveryDialect) {
     read.frames = {{"robot_base", kStands}, {"UTOOL[2]", X_FT}, {"TOOL[1]", X_FT}};
     const test::Corrected made = corrected_by_shift(dialect, files, read);
     ASSERT_EQ(made.refusal, "") << name_of(dialect);
-    ASSERT_EQ(made.program.rows.size(), 1u) << name_of(dialect);
-    expect_in_base(made.program.rows[0], name_of(dialect));
+    ASSERT_FALSE(made.program.rows.empty()) << name_of(dialect);
+    expect_in_base(made.program.rows.back(), name_of(dialect));
   }
 }
 
