@@ -762,7 +762,7 @@ TEST_F(HandlersTest, EveryAnswerOfAModelAndTheListSayWhatAUserOfItShouldKnow) {
   backend_.registry.publish(std::make_shared<const ServedModel>(ServedModel{"cell-7", 2, model}));
   const auto codes = [](const wire::ModelInfo& told) {
     std::vector<std::string> all;
-    for (const wire::Note& note : told.notes()) all.push_back(note.code());
+    for (const wire::Note& note : told.notes()) all.emplace_back(note.code().c_str());
     return all;
   };
   const std::vector<std::string> expected = {"robot_not_confirmed"};
