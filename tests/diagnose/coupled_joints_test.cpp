@@ -82,8 +82,8 @@ HeavyArm coupled_arm(CouplingKind kind, const World& world, std::uint64_t seed) 
   auto cell = std::make_shared<Cell>(*arm.cell);
   std::vector<Joint> joints;
   for (int j = 0; j < cell->robot.size(); ++j) joints.push_back(cell->robot.joint(j));
-  joints[2].lower = from_deg(-180);
-  joints[2].upper = from_deg(180);
+  joints[2].lower = from_deg(-270);
+  joints[2].upper = from_deg(270);
   cell->robot = test::demand(Chain::make("coupled", joints, {{2, 1, -1.0, kind}}));
   cell->joint_ranges.clear();
   arm.cell = cell;
