@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 
@@ -156,10 +157,36 @@ Result<CalibrationResult> calibrate_from(CalibrationProblem placed, const Calibr
   return calibrate_placed(std::move(placed), options);
 }
 
+/// Beside a tool that is known, positions at one place would fit a base that is turned anyhow: its turn shows only in
+/// what the real tool is off the drawn one. So both are found from all sides, and the base is taken.
+Status turn_by_free_tool(PhysicalModel& model, const MeasurementBatch& batch, const CalibrateOptions& options) {
+  Result<PhysicalModel> frames =
+      make_physical_model(model.cell, {std::string(cause_correcting(causes::Part::kBase).spelling),
+                                       std::string(cause_correcting(causes::Part::kTool).spelling)});
+  if (!frames) return tl::make_unexpected(frames.error());
+  const std::vector<Pose> bases = likely_bases(model, batch);
+  double best = -std::numeric_limits<double>::infinity();
+  for (const Pose& X_WB : bases) {
+    frames->X_WB = X_WB;
+    const auto found = identify({*frames, positions_of(batch)}, options);
+    if (!found || found->log_evidence <= best) continue;
+    best = found->log_evidence;
+    model.X_WB = found->model.state(batch.measurements.front().context).X_WB;
+  }
+  return {};
+}
+
 /// The most likely of those that begin at each of the places where the base may stand.
 Result<CalibrationResult> calibrate_located(const CalibrationProblem& problem, const CalibrateOptions& options) {
+  std::vector<Pose> bases = likely_bases(problem.model, problem.batch);
+  if (bases.size() > 1 && !has_unknown_tool(*problem.model.cell)) {
+    PhysicalModel turned = problem.model;
+    if (Status found = turn_by_free_tool(turned, problem.batch, options); !found)
+      return tl::make_unexpected(found.error());
+    bases = {turned.X_WB};
+  }
   std::optional<Result<CalibrationResult>> best;
-  for (const Pose& X_WB : likely_bases(problem.model, problem.batch)) {
+  for (const Pose& X_WB : bases) {
     CalibrationProblem placed = problem;
     placed.model.X_WB = X_WB;
     Result<CalibrationResult> found = calibrate_from(std::move(placed), options);

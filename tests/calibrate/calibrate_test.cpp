@@ -111,6 +111,17 @@ TEST(Calibrate, OnePointSeenFromAllSidesTellsTheToolAndSaysThatItHardlyTellsHowT
   }
 }
 
+TEST(Calibrate, OnePointSeenWithAToolThatIsOffTellsHowTheBaseIsTurnedByHowTheToolIsOff) {
+  const auto cell = test::cell_of_one_point("null", test::kToolOfOnePoint, "{error_sources: []}");
+  for (const Vector3& turn : {Vector3(0.1, -0.2, 2.8), Vector3(-2.2, 0.4, 0.6), Vector3(0.5, 1.9, -1.2)}) {
+    const Pose X_WB = make_pose(rotation_exp(turn), {1.2, -0.5, 0.3});
+    const MeasurementBatch batch = test::one_point(*cell, 1e-3 * Vector3(4, -3, 6), X_WB, 30, 3);
+    const Result<CalibrationResult> result = calibrate(cell, {}, batch, {});
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_LT(to_deg(pose_difference(result->model.X_WB, X_WB).tail<3>().norm()), 1);
+  }
+}
+
 TEST(Calibrate, SaysWhichParametersOnlyTheirSumIsKnownOf) {
   const Result<CalibrationResult> result = calibrate(cell_7(), kM3, measured(chapter_5_robot(cell_7()), 120, 7), {});
   ASSERT_TRUE(result);
