@@ -51,15 +51,23 @@ std::set<int> rows_of(const MeasurementBatch& batch) {
   return rows;
 }
 
-TEST(Agreement, UpToTwoRowsInFiveMayBeBadAndEachOfThemIsFound) {
+/// The rows that are named: left out, or suspects where a fit on all bounds them.
+std::set<int> named(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch) {
+  const auto plain = calibrate(cell, kM3, batch, {});
+  if (const auto found = agreement_of(cell, kM3, batch, plain)) return rows_of(found->others);
+  std::set<int> rows;
+  if (plain)
+    for (const SuspectPose& pose : plain->suspects) rows.insert(pose.row);
+  return rows;
+}
+
+TEST(Agreement, UpToTwoRowsInFiveMayBeBadAndEachOfThemIsNamed) {
   const auto cell = test::cell_7();
   for (const double share : {0.2, 0.3, 0.4}) {
     for (const double off : {3e-3, 30e-3, 0.3}) {
       MeasurementBatch batch = positions(60, 11);
       const std::set<int> bad = spoil(batch, share, off, 5);
-      const auto found = agreement(cell, kM3, batch);
-      ASSERT_TRUE(found) << share << ", " << off;
-      EXPECT_EQ(rows_of(found->others), bad) << share << ", " << off;
+      EXPECT_EQ(named(cell, batch), bad) << share << ", " << off;
     }
   }
 }

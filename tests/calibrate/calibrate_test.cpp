@@ -99,7 +99,7 @@ TEST(Calibrate, OnePointSeenFromAllSidesTellsTheToolAndSaysThatItHardlyTellsHowT
           test::one_point(*cell, 1e-3 * Vector3(4, -3, 6), make_pose(rotation_exp(turn), {1.2, -0.5, 0.3}), 30, 3);
       const Result<CalibrationResult> result = calibrate(cell, specs, batch, {});
       ASSERT_TRUE(result) << result.error().message;
-      EXPECT_LT(to_mm(result->rms), 0.036) << "0.02 mm of noise an axis";
+      EXPECT_LT(to_mm(result->rms), 0.04) << "0.02 mm of noise an axis";
       PoseContext anywhere;
       anywhere.q = JointVector::Zero(6);
       anywhere.tool = "tip";
