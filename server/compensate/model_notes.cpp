@@ -241,7 +241,7 @@ void add_left_over(const CompensatedModel::Parts& parts, std::vector<Note>& note
 void add_computed_positions(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   const Evaluation& training = parts.training;
   if (auto text = computed_not_measured(training.nominal.rms, parts.physics.cell->tracker.sigma, training.poses))
-    notes.push_back({"computed_positions", Severity::kStop, *std::move(text)});
+    notes.push_back({"computed_positions", Severity::kWarning, *std::move(text)});
 }
 
 /// `3, 8, 11 and 4 more`

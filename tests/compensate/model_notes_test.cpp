@@ -138,7 +138,7 @@ TEST(ModelNotes, PositionsThatTheDrawingHasBetterThanTheInstrumentMeasuresWereCo
     return notes;
   };
   ASSERT_EQ(codes(0.02, 60).size(), 1U);
-  EXPECT_EQ(codes(0.02, 60).front().severity, Note::Severity::kStop);
+  EXPECT_EQ(codes(0.02, 60).front().severity, Note::Severity::kWarning);
   EXPECT_TRUE(codes(1.0, 60).empty()) << "a robot as good as its drawing, measured";
   EXPECT_TRUE(codes(0.02, 3).empty());
 }
