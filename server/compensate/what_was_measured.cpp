@@ -114,6 +114,12 @@ std::string sides_text(const WhatWasMeasured& measured, const std::vector<std::p
   return text;
 }
 
+/// Poses in one plane or about one point have none.
+std::string cubic_metres(double volume) {
+  constexpr double kLeast = 1e-3;
+  return volume < kLeast ? "less than 0.001 m³" : fmt::format("{:.3g} m³", volume);
+}
+
 std::string volume_text(const WhatWasMeasured& measured) {
   std::string text;
   for (int k = 0; k < 3; ++k)
@@ -121,8 +127,8 @@ std::string volume_text(const WhatWasMeasured& measured) {
                         to_mm(measured.upper(k)));
   text += " mm of the tool from the robot's base";
   if (!measured.reach) return text;
-  return text + fmt::format(", {:.3g} of these {:.3g} m³ within {:.0f} mm of a measured place", measured.volume,
-                            (measured.upper - measured.lower).prod(), to_mm(*measured.reach));
+  return text + fmt::format(", {} of this box within {:.0f} mm of a measured place", cubic_metres(measured.volume),
+                            to_mm(*measured.reach));
 }
 
 }  // namespace
