@@ -122,7 +122,7 @@ class Finding {
   void follow(std::size_t m) {
     const ProgramMove& move = program_.moves[m];
     std::vector<Stand> from = stands_before(move);
-    if (from.empty() && move.choice != JointChoice::kByConfiguration && move.near.empty()) return;
+    if (from.empty() && move.choice != JointChoice::kByConfiguration && move.near.empty() && move.axes.empty()) return;
     const Stand line{from.size() == 1 ? from[0].q : std::nullopt, true};
     for (const std::size_t t : move.targets) {
       const bool is_open = move.choice != JointChoice::kByConfiguration && !is_joints(program_.targets[t].coordinates);
@@ -133,7 +133,8 @@ class Finding {
       from = {{found_.targets[t].q}};
     }
     const bool known = !move.targets.empty() && !move.left_some && from[0].q;
-    const Stand now = known ? from[0] : move.choice == JointChoice::kOnALine ? line : Stand{};
+    Stand now = known ? from[0] : move.choice == JointChoice::kOnALine ? line : Stand{};
+    if (!move.axes.empty()) now = {arm_.from_axes(move.axes, {})};
     if (stands_[m] == now) return;
     stands_[m] = now;
     changed_ = true;

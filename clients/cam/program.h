@@ -169,6 +169,7 @@ struct ProgramMove {
   std::optional<double> speed_mm_s = {};  ///< of the tool, where the motion says it
   JointChoice choice = JointChoice::kByConfiguration;
   std::vector<double> near = {};      ///< rad, joints that the motion names; empty: none
+  std::vector<double> axes = {};      ///< deg, where it commands axes, also where these are left; empty: it does not
   std::set<std::size_t> before = {};  ///< motions that may be the last before it, as motions_before() has them
 };
 

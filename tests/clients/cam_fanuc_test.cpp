@@ -263,7 +263,9 @@ std::string with_gun(const std::string& more = "") {
 TEST(Fanuc, AnAxisThatMovesIsNamedByGroupAndNumberUnlessItIsSaidToCarryNothing) {
   EXPECT_NE(why(ls(with_gun()), "P[1]").find("group 2, axis 1 moves, and the cell has none"), std::string::npos)
       << why(ls(with_gun()), "P[1]");
-  Program program = read_program(Dialect::kFanuc, {{"p1.ls", with_gun()}}, {});
+  Program program = read_program(Dialect::kFanuc, {{"p1.ls", with_gun()}},
+                                 {.frames = {{"UFRAME[1]", make_pose(Matrix3::Identity(), {1.5, 0, .5})}}});
+  ASSERT_EQ(program.targets.size(), 2u);
   const Status unknown = take_idle_axes(program, {"g"});
   ASSERT_FALSE(unknown);
   EXPECT_EQ(unknown.error().field, "--idle-axis");

@@ -190,6 +190,18 @@ TEST(Posture, WithoutJointsBeforeATargetIsLeftWithTheReason) {
   EXPECT_TRUE(last_of(ur(ready + "  while i < 2:\n" + goal + "  end\n")).q);
 }
 
+TEST(Posture, JointsThatAreLeftAsTheyStandSayWhereTheArmIsAllTheSame) {
+  const Chain chain = read_robot(TRAMMEL_SOURCE_DIR "/models/universal-robots_ur10.yaml").value();
+  const std::string text = "def p():\n  set_tcp(p[0, 0, 0.1, 0, 0, 0])\n  movej(" + joints_text(kReady) +
+                           ")\n  movej(" + pose_of_joints(kReady) + ")\nend\n";
+  ReadOptions options;
+  options.keep_joints = true;
+  const Program program = read_program(Dialect::kUrScript, {{"p.script", text}}, options);
+  const auto made = nominal_targets(program, ArmOfProgram(chain), {{{"tool", Pose(kTcp)}}, {}}, "", "").value();
+  ASSERT_EQ(made.targets.size(), 1u);
+  EXPECT_TRUE(made.targets[0].q) << made.targets[0].why_not;
+}
+
 TEST(Posture, APointThatIsReachedInTwoPosturesIsLeft) {
   const Joints other = with({0.89955, -1.91986, 1.74533, -1.39626, -1.57080, -0.67124});
   const std::string lines = "  hole = " + pose_of_joints(other) +

@@ -550,6 +550,7 @@ class Reader {
       if (std::find(target.used_at.begin(), target.used_at.end(), use->motion->line) == target.used_at.end())
         target.used_at.push_back(use->motion->line);
     }
+    if (site.joints) note_axes(data, uses);
     const Told<void> read = site.joints ? read_joints(data, target) : read_target(data, uses, place, target);
     std::string why = read ? "" : read.error();
     if (why.empty()) why = program_.tools[target.tool].why_not;
@@ -574,6 +575,12 @@ class Reader {
     const std::size_t indent = text.find_first_not_of(" \t", target.comment_at);
     std::string original = meaning_->text_of(*place.node, *place.scope);
     target.comment = text.substr(target.comment_at, indent - target.comment_at) + "! trammel: was " + original;
+  }
+
+  void note_axes(const Data& data, const std::vector<const Use*>& uses) {
+    const Told<JointValue> value = meaning_->joints_of(*data.node, *data.scope);
+    if (!value) return;
+    for (const Use* use : uses) program_.moves[use->move].axes = value->axes;
   }
 
   Told<void> read_joints(const Data& data, ProgramTarget& target) {

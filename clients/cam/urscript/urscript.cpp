@@ -8,6 +8,7 @@
 #include <tl/expected.hpp>
 
 #include "clients/cam/flow.h"
+#include "clients/cam/nominal_targets.h"
 #include "clients/cam/scan.h"
 #include "clients/cam/sites.h"
 #include "server/base/plain_text.h"
@@ -506,6 +507,8 @@ class Script {
                                                    : std::string("an expression decides it"));
     }
     values_[now->begin] = *now;
+    if (now->kind == Value::Kind::kJoints)
+      program_.moves.back().axes = in_degrees(Coordinates::kJointRadians, numbers_in(*now));
     sites_.add(index_, now->begin, name,
                {tool_, 0, std::string(pieces_[at].text), index_, pieces_[at].line, program_.moves.size() - 1,
                 !pieces_[at].is("movej")});

@@ -192,8 +192,9 @@ struct CorrectArguments : ApplyArguments {
   double tolerance_mm = 0;
 
   [[nodiscard]] CorrectProgramArguments of_program() const {
-    return {inputs,       model,  tool,        payload, format, output, receipt,     report,       json,    frames,
-            allow_failed, strict, keep_digits, undo,    again,  split,  keep_joints, tolerance_mm, service, idle_axes};
+    return {inputs, model, tool,        payload,      format,  output,      receipt,
+            report, json,  frames,      allow_failed, strict,  keep_digits, undo,
+            again,  split, keep_joints, tolerance_mm, service, idle_axes,   task};
   }
 };
 
@@ -202,6 +203,7 @@ Status check_table_usage(const CorrectArguments& arguments) {
   const std::pair<bool, const char*> of_programs[] = {{!arguments.report.empty(), "--report"},
                                                       {!arguments.frames.empty(), "--frames"},
                                                       {!arguments.idle_axes.empty(), "--idle-axis"},
+                                                      {!arguments.task.empty(), "--task"},
                                                       {!arguments.task.empty(), "--task"},
                                                       {arguments.split, "--split"},
                                                       {arguments.keep_digits, "--keep-digits"},
@@ -330,11 +332,12 @@ Status check_usage(const PredictArguments& arguments) {
         .of("--joints")
         .next("name a program, or joints by --joints");
   }
-  if (!program && !(arguments.format.empty() && arguments.frames.empty() && arguments.idle_axes.empty())) {
-    return failure(ErrorCode::kUsage, "--format, --frames and --idle-axis are of programs, not of joints")
-        .of(!arguments.format.empty()   ? "--format"
-            : !arguments.frames.empty() ? "--frames"
-                                        : "--idle-axis");
+  const std::pair<bool, const char*> of_programs[] = {{!arguments.format.empty(), "--format"},
+                                                      {!arguments.frames.empty(), "--frames"},
+                                                      {!arguments.idle_axes.empty(), "--idle-axis"},
+                                                      {!arguments.task.empty(), "--task"}};
+  for (const auto& [said, option] : of_programs) {
+    if (said && !program) return failure(ErrorCode::kUsage, "{} is of programs, not of joints", option).of(option);
   }
   if (program && (arguments.covariance || arguments.orientation)) {
     return failure(ErrorCode::kUsage, "--covariance and --orientation are of joints, not of programs")
