@@ -90,8 +90,12 @@ void prepare_audit(SQLite::Database& database, bool is_new, int schema_before) {
 }
 
 std::int64_t last_audit_at(SQLite::Database& database) {
-  SQLite::Statement row(database, "SELECT at FROM audit ORDER BY number DESC LIMIT 1");
-  return row.executeStep() ? row.getColumn(0).getInt64() : 0;
+  try {
+    SQLite::Statement row(database, "SELECT at FROM audit ORDER BY number DESC LIMIT 1");
+    return row.executeStep() ? row.getColumn(0).getInt64() : 0;
+  } catch (const SQLite::Exception&) {
+    return 0;
+  }
 }
 
 std::int64_t audit_rows(SQLite::Database& database) { return end_of(database).rows; }

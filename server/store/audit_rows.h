@@ -22,7 +22,7 @@ void record_audit(SQLite::Database& database, const AuditEntry& entry, const Cha
 /// Makes the trail where there is none, and records how it began.
 void prepare_audit(SQLite::Database& database, bool is_new, int schema_before);
 
-/// When the last row was written, as the clock stood then (Unix time, s); 0: there is none.
+/// When the last row was written, as the clock stood then (Unix time, s); 0: there is none that can be read.
 [[nodiscard]] std::int64_t last_audit_at(SQLite::Database& database);
 
 /// How many rows the trail has.

@@ -202,7 +202,7 @@ TEST_F(ReadinessTest, AStoreThatCannotBeReadIsNotedWhereCopiesOfItsModelsAreServ
   std::ofstream(server_.store_path(), std::ios::binary) << std::string(4096, 'x');
   server_.set_up();
   take_up();
-  expect_ready(State::kServed);
+  expect_ready(State::kCopyServed);
   EXPECT_NE(ready().told["notes"][0].get<std::string>().find("copies of its models are served"), std::string::npos);
 }
 
