@@ -210,8 +210,10 @@ TEST_F(DaemonTest, ARollbackThatIsRepeatedAfterACrashGoesBackOnce) {
   const auto versions = session_->models("cell-7");
   ASSERT_TRUE(versions) << versions.error().message;
   ASSERT_EQ(versions->size(), 3u);
+  client::ChangeOptions by_force;  // the first one is worse than those after it
+  by_force.force = true;
   for (const client::ModelInfo& version : *versions) {
-    ASSERT_TRUE(session_->activate("cell-7", version.version)) << version.version;
+    ASSERT_TRUE(session_->activate("cell-7", version.version, by_force)) << version.version;
   }
   const int last = model().version;
   client::ChangeOptions once;

@@ -567,7 +567,7 @@ TEST_F(TrainerTest, WhereNoModelCanBeLoadedTheRecordOfTheOneInForceJudges) {
   train("first");
   for (const int version : {2, 3}) {
     train(std::to_string(version), {.seed = static_cast<std::uint64_t>(version)});
-    ASSERT_TRUE(trainer_->activate("cell-7", version));
+    ASSERT_TRUE(trainer_->activate("cell-7", version, {}, true));
   }
   SQLite::Database(folder_.file("trammel.db"), SQLite::OPEN_READWRITE)
       .exec("UPDATE models SET content = replace(content, '10', '11')");
@@ -588,7 +588,7 @@ TEST_F(TrainerTest, ARollbackStepsPastWhatCannotBeLoaded) {
   train("first");
   for (const int version : {2, 3}) {
     train(std::to_string(version), {.seed = static_cast<std::uint64_t>(version)});
-    ASSERT_TRUE(trainer_->activate("cell-7", version));
+    ASSERT_TRUE(trainer_->activate("cell-7", version, {}, true));
   }
   SQLite::Database(folder_.file("trammel.db"), SQLite::OPEN_READWRITE)
       .exec("UPDATE models SET content = replace(content, '10', '11') WHERE version = 2");
