@@ -110,7 +110,7 @@ struct JobStatus {
 struct ChangeOptions {
   std::optional<int> expected_version = {};  ///< in force, 0: none; with another one nothing changes (kConflict)
   std::string id = {};      ///< unique for ever: the change happens once under it; empty: the session makes one
-  bool force = false;       ///< of an activation: also of an imported version that is worse than the one in force
+  bool force = false;       ///< of an activation: also of a version that is worse than the one in force
   std::string reason = {};  ///< for the audit trail, of changes of what is in force and of quarantine
 };
 
