@@ -65,9 +65,12 @@ class RowSearch {
     const double before = plain ? left(*plain) : kNoModelError;
     if (before < kAsked * sigma_) return all;
     const MeasurementBatch few = only(batch_, drawn(all.size(), kMostRows));
-    std::optional<CalibrationResult> found = concentrated(few, fitted(sources_, few));
-    const auto from_frames = concentrated(few, fitted(frames(), few));
-    if (from_frames && (!found || left(*from_frames) < left(*found))) found = from_frames;
+    std::optional<CalibrationResult> found;
+    for (const std::vector<std::string>& start : {sources_, frames(), std::vector<std::string>()}) {
+      if (found && start.empty()) break;  // the drawn arm, where rows are so bad that nothing fits all of them
+      std::optional<CalibrationResult> one = concentrated(few, fitted(start, few));
+      if (one && (!found || left(*one) < left(*found))) found = std::move(one);
+    }
     if (!found || left(*found) > kMuchLess * before) return all;
     const Rows rows = readmitted(std::move(*found), before);
     return static_cast<double>(rows.size()) < kAgreeing * static_cast<double>(all.size()) ? all : rows;
