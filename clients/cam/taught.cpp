@@ -13,20 +13,20 @@ namespace {
 
 constexpr std::size_t kFewest = 4;      // poses that show a habit
 constexpr std::size_t kMost = 500;      // nobody jogs to more
-constexpr double kStep_mm = 0.5;        // of plain coordinates
-constexpr double kSame_mm = 1e-4;       // below any written digit
+constexpr double kStep = 0.5;           // mm: plain coordinates are multiples of it
+constexpr double kSame = 1e-4;          // mm: below any written digit
 constexpr double kSameRotation = 5e-5;  // rad: a jogged wrist comes back to 1e-4 at best
-constexpr double kNearest_mm = 20;      // paths of CAM systems have their points closer together
+constexpr double kNearest = 20;         // mm: paths of CAM systems have their points closer together
 constexpr std::size_t kTenth = 10;      // of the poses, or one, may look drawn by chance
 
-bool is_plain(double mm) { return std::abs(mm - kStep_mm * std::round(mm / kStep_mm)) < kSame_mm; }
+bool is_plain(double mm) { return std::abs(mm - kStep * std::round(mm / kStep)) < kSame; }
 
 /// An axis of the tool lies along one of the frame: nobody jogs that exactly.
 bool is_aligned(const Pose& X) { return X.linear().cwiseAbs().maxCoeff() > std::cos(kSameRotation); }
 
 bool share_a_number(const Pose& a, const Pose& b) {
   const Vector3 apart = ((a.translation() - b.translation()) * to_mm(1)).cwiseAbs();
-  return apart.minCoeff() < kSame_mm || pose_difference(a, b).tail<3>().norm() < kSameRotation;
+  return apart.minCoeff() < kSame || pose_difference(a, b).tail<3>().norm() < kSameRotation;
 }
 
 bool looks_drawn(const std::vector<Pose>& poses, std::size_t k) {
@@ -55,7 +55,7 @@ std::string note_on_taught_targets(const Program& program) {
   for (const ProgramTarget& target : program.targets) {
     if (!is_joints(target.coordinates) && !target.folded) poses.push_back(pose_of(target.coordinates, target.numbers));
   }
-  if (poses.size() < kFewest || poses.size() > kMost || usual_step(poses) < kNearest_mm) return "";
+  if (poses.size() < kFewest || poses.size() > kMost || usual_step(poses) < kNearest) return "";
   std::size_t drawn = 0;
   for (std::size_t k = 0; k < poses.size(); ++k) drawn += looks_drawn(poses, k) ? 1 : 0;
   if (drawn > std::max<std::size_t>(1, poses.size() / kTenth)) return "";

@@ -145,6 +145,7 @@ TEST_F(HandlersTest, JointsOutsideTheLimitsHaveNoPrediction) {
 
 TEST_F(HandlersTest, ATrainedModelIsNotAskedAboutAnotherTool) {
   CompensatedModel::Parts parts = test::shifted_model(backend_.cell, 1e-4).parts();
+  parts.physics.tools["probe"] = Pose::Identity();
   parts.trained_with = {{"probe", ""}};
   backend_.registry.publish(
       std::make_shared<const ServedModel>(ServedModel{"cell-7", 1, CompensatedModel::make(std::move(parts)).value()}));
