@@ -317,8 +317,8 @@ TEST(Flange, ToolsOnPosesOfTheirOwnTellTheSameArm) {
 
 TEST(Flange, IsChosenWhereThereAreSeveralLeversAndNotAskedWhereThereIsOne) {
   BiasOptions options;
-  options.starts = 4;
-  const MatrixXd q = random_joints(60, 51);
+  options.starts = 2;
+  const MatrixXd q = random_joints(50, 51);
   const auto several = choose_bias(seen_problem(q, {kA, kB, kC}, 51), options);
   ASSERT_TRUE(several.has_value()) << several.error().message;
   EXPECT_TRUE(several->choice.kernel.ends_with("+ flange")) << several->choice.sentence;

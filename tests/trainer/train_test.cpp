@@ -222,7 +222,7 @@ TEST(Train, ErrorsOfTheJointsAnglesArePredictedAtPosesNeverSeenByABiasWithJointM
     const Eigen::Index first = add_source(robot.truth, map);
     robot.truth.values.segment(first, static_cast<Eigen::Index>(map->parameters().size())).setConstant(4e-5);
   }
-  const MeasurementBatch batch = test::measured(robot, 130, 61);
+  const MeasurementBatch batch = test::measured(robot, 100, 61);
   const MeasurementBatch fresh = test::measured(robot, 200, 62);
   const Evaluation plain = test::demand(train(cell, batch, quick("M3", "se"))).evaluate(fresh);
   const Evaluation mapped = test::demand(train(cell, batch, quick("M3", "se + joint_map"))).evaluate(fresh);
