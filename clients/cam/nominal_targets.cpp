@@ -115,7 +115,7 @@ class Finding {
       }
     }
     for (std::size_t t = 0; t < program_.targets.size(); ++t) {
-      if (!done_[t]) by_configuration(t);
+      if (!done_[t]) by_configuration(t, program_.targets[t].file);
     }
   }
 
@@ -129,7 +129,7 @@ class Finding {
       if (is_open)
         find_open(t, move, from);
       else
-        by_configuration(t);
+        by_configuration(t, move.file);
       from = {{found_.targets[t].q}};
     }
     const bool known = !move.targets.empty() && !move.left_some && from[0].q;
@@ -150,8 +150,9 @@ class Finding {
     return from;
   }
 
-  void by_configuration(std::size_t t) {
-    std::optional<JointVector>& previous = last_[program_.targets[t].file];
+  /// What the target does not say follows from the motion before in this file, wherever the targets stand.
+  void by_configuration(std::size_t t, std::size_t file) {
+    std::optional<JointVector>& previous = last_[file];
     if (!done_[t] && prepare(t)) take(t, as_said(t, previous));
     done_[t] = true;
     if (found_.targets[t].q) previous = found_.targets[t].q;

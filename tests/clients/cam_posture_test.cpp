@@ -226,5 +226,25 @@ TEST(Posture, TwoPosturesThatAreEquallyNearAreLeft) {
   EXPECT_NE(last_of(made).why_not.find("equally near"), std::string::npos) << last_of(made).why_not;
 }
 
+// A line does not turn the wrist over: joint 5 keeps its sign, and joints 4 and 6 stay within half a turn.
+TEST(Posture, WhatATargetOfKrlDoesNotSayFollowsFromTheMotionBeforeWhereverThatTargetStands) {
+  const Chain chain = read_robot(TRAMMEL_SOURCE_DIR "/models/kuka_kr210-r2700-extra.yaml").value();
+  const std::string config = "DEFDAT $CONFIG\nTOOL_DATA[1]={X 0,Y 0,Z 200,A 0,B 0,C 0}\nENDDAT\n";
+  const std::string dat = "DEFDAT p PUBLIC\nDECL E6POS XP1={X 1500,Y 200,Z 900,A 0,B 90,C 0,S 2,T 2}\nENDDAT\n";
+  const std::string src =
+      "DEF p( )\n$TOOL=TOOL_DATA[1]\n$BASE=$NULLFRAME\nPTP XP1\nLIN {X 1500,Y 200,Z 800,A 0,B 90,C 0}\nEND\n";
+  const Program program = read_program(Dialect::kKrl, {{"p.src", src}, {"p.dat", dat}, {"$config.dat", config}}, {});
+  ASSERT_TRUE(program.left.empty()) << program.left[0].why;
+  Pose X_FT = Pose::Identity();
+  X_FT.translation().z() = 0.2;
+  const auto targets = nominal_targets(program, ArmOfProgram(chain), {{{"tool", X_FT}}, {}}, "", "").value().targets;
+  ASSERT_EQ(targets.size(), 2u);
+  for (const NominalTarget& target : targets) {
+    ASSERT_TRUE(target.q) << target.why_not;
+    EXPECT_GT((*target.q)(4), 0) << "S 2 and T 2 have joint 5 above zero";
+    EXPECT_GT((*target.q)(3), 0);
+  }
+}
+
 }  // namespace
 }  // namespace trammel::cam
