@@ -258,9 +258,10 @@ Result<std::vector<Job>> Session::jobs(const std::string& cell) const {
 }
 
 Result<int> Session::activate(const std::string& cell, int version, const std::string& reason,
-                              std::optional<int> expected_version) const {
+                              std::optional<int> expected_version, bool force) const {
   client::ChangeOptions change;
   change.expected_version = expected_version;
+  change.force = force;
   change.reason = reason;
   const auto now = inside_->session->activate(cell, version, change);
   if (!now) return passed_on(now);

@@ -590,10 +590,10 @@ void add_session_changes(py::class_<Session>& session) {
       .def(
           "activate",
           [](const Session& s, const std::string& cell, int version, const std::string& reason,
-             std::optional<int> expected_version) {
-            return value_or_raise(unlocked([&] { return s.activate(cell, version, reason, expected_version); }));
+             std::optional<int> expected_version, bool force) {
+            return value_or_raise(unlocked([&] { return s.activate(cell, version, reason, expected_version, force); }));
           },
-          "cell"_a, "version"_a, "reason"_a, "expected_version"_a)
+          "cell"_a, "version"_a, "reason"_a, "expected_version"_a, "force"_a)
       .def(
           "roll_back",
           [](const Session& s, const std::string& cell, const std::string& reason) {

@@ -533,6 +533,22 @@ class Service(unittest.TestCase):
         with self.assertRaisesRegex(trammel.Usage, "a Model"):
             self.session.import_model("cell-7", "cell.model")
 
+    def test_what_is_worse_than_the_model_in_force_is_activated_by_force_only(self):
+        present = self.session.models()[0]["version"]
+        worse = trammel.train(self.cell, trammel.simulate(self.cell, TRUTH, self.planned, seed=9), level="M1", bias="none")
+        version = self.session.import_model("cell-7", worse)
+        with self.assertRaisesRegex(trammel.Refused, "worse than version") as raised:
+            self.session.activate("cell-7", version)
+        at_the_command_line = subprocess.run(
+            [BUILD / "clients/trammel", "activate", "--host", self.where["hosts"][0], "--domain", str(self.where["domain"]),
+             "--model", f"cell-7@{version}"], capture_output=True, text=True)
+        self.assertEqual(at_the_command_line.returncode, 3, at_the_command_line.stderr)
+        self.assertIn(raised.exception.message, at_the_command_line.stderr)
+        self.assertEqual(self.session.models()[0]["version"], present)
+        self.assertEqual(self.session.activate("cell-7", version, force=True), version)
+        self.assertEqual(self.session.models()[0]["version"], version)
+        self.assertEqual(self.session.activate("cell-7", present), present)
+
     def test_a_batch_that_is_stored_is_learned_from_again(self):
         ended = self.session.wait_for(self.session.retrain("cell-7", level="M2"), limit_s=300)
         self.assertEqual(ended["stage"], "done", ended)

@@ -116,9 +116,10 @@ class TRAMMEL_API Session {
                                      const std::function<void(const Job&)>& listener = {}) const;
   /// Jobs that wait or run or ended lately, of one cell or (empty) of all, oldest first.
   [[nodiscard]] Result<std::vector<Job>> jobs(const std::string& cell) const;
-  /// Puts a version in force; refused where `expected_version` is not. `reason` is for the audit trail.
+  /// Puts a version in force; refused where `expected_version` is not, and where it is worse than the version in force
+  /// or cannot be judged, unless `force` is said. `reason` is for the audit trail.
   [[nodiscard]] Result<int> activate(const std::string& cell, int version, const std::string& reason = {},
-                                     std::optional<int> expected_version = {}) const;
+                                     std::optional<int> expected_version = {}, bool force = false) const;
   /// Adds a model file's text to the history of its cell; activate() puts it in force. Returns its version.
   [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text) const;
   /// Puts the version before in force again, and returns it.

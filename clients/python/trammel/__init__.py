@@ -505,9 +505,11 @@ class Session:
         """Jobs that wait or run or ended lately, oldest first."""
         return self._inside.jobs(cell)
 
-    def activate(self, cell: str, version: int, reason: str = "", expected_version: Optional[int] = None) -> int:
-        """Puts a version in force; `Conflict` where another than `expected_version` is."""
-        return self._inside.activate(cell, version, reason, expected_version)
+    def activate(self, cell: str, version: int, reason: str = "", expected_version: Optional[int] = None,
+                 force: bool = False) -> int:
+        """Puts a version in force; `Conflict` where another than `expected_version` is. `Refused` where it is worse than
+        the version in force, or cannot be judged, unless `force` is true."""
+        return self._inside.activate(cell, version, reason, expected_version, force)
 
     def roll_back(self, cell: str, reason: str = "") -> int:
         """Puts the version before in force again, and returns it."""
