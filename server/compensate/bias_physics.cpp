@@ -43,7 +43,7 @@ BiasFeatures turned(const BiasFeatures& features) {
     other << rows.bottomRows<3>(), rows.topRows<3>();
     return other;
   };
-  return {swapped(features.by_joint), swapped(features.by_parameter), features.lever_F, features.R_BF};
+  return {swapped(features.by_joint), swapped(features.by_parameter), features.lever_F, features.R_BF, features.gears};
 }
 
 BiasPhysics::BiasPhysics(const PhysicalModel& physics) : BiasPhysics(with_standard_sources(physics), AsItIs{}) {}
@@ -100,8 +100,10 @@ BiasFeatures BiasPhysics::at(const PoseContext& context) const {
   BiasFeatures features{in_B(by_deflection_W), in_B(J_W * prior_stddev_.asDiagonal())};
   features.lever_F = state.X_FT.translation();
   features.R_BF = R_BW * R_WT * state.X_FT.linear().transpose();
-  for (int j = 0; j < whole_.cell->robot.size(); ++j) {
-    if (whole_.cell->robot.joint(j).type != JointType::kRevolute) features.by_joint.col(j).setZero();
+  const Chain& robot = whole_.cell->robot;
+  if (!robot.counts_gears()) features.gears = robot.gear_angles(context.q);
+  for (int j = 0; j < robot.size(); ++j) {
+    if (robot.joint(j).type != JointType::kRevolute) features.by_joint.col(j).setZero();
   }
   return features;
 }

@@ -100,7 +100,7 @@ Result<PreparedBatch> prepare(const Cell& cell, const CheckedBatch& batch,
   PreparedBatch prepared;
   // Where rows had to be moved, what begins at a pose is told by its pose id, not by a row.
   prepared.sorted = !batch.is_in_order_of_time();
-  const CheckedBatch ordered = batch.in_order_of_time();
+  const CheckedBatch ordered = batch.in_order_of_time(cell.robot);
   prepared.sessions = with_noise_as_repeated(sessions, ordered.rows(), cell.tracker);
   const auto in_one_world = [&](const MeasurementBatch& rows) {
     return aligned(rows, prepared.sessions, cell.tracker);
@@ -208,7 +208,7 @@ std::string told_of_sessions(const Diagnosis& diagnosis) {
 std::string told_of_jump(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                          const Diagnosis& diagnosis) {
   if (diagnosis.verdict != Verdict::kUnknown) return "";
-  const auto jump = jump_within(cell, batch.in_order_of_time().rows());
+  const auto jump = jump_within(cell, batch.in_order_of_time(cell->robot).rows());
   if (!jump) return "";
   return fmt::format(
       " But something changed in the middle of the batch, {}: give the poses before and after it by "

@@ -172,7 +172,7 @@ bool CheckedBatch::is_in_order_of_time() const {
   return std::is_sorted(poses.begin(), poses.end(), earlier);
 }
 
-CheckedBatch CheckedBatch::in_order_of_time() const {
+CheckedBatch CheckedBatch::in_order_of_time(const Chain& robot) const {
   if (is_in_order_of_time()) return *this;
   const auto& before = rows().measurements;
   std::vector<std::size_t> order(before.size());
@@ -187,7 +187,7 @@ CheckedBatch CheckedBatch::in_order_of_time() const {
     is_held_out[i] = content_->is_held_out[order[i]];
   }
   fill_velocity(sorted);
-  fill_history(sorted);
+  fill_history(sorted, robot);
   return {std::move(sorted), std::move(is_held_out), hash()};
 }
 
@@ -209,7 +209,7 @@ Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell
   if (const Status poses = check_poses(batch, cell, where); !poses) return with_reading(poses.error());
   if (const Status spread = check_spreads(batch, cell, where); !spread) return with_reading(spread.error());
   fill_velocity(batch);
-  fill_history(batch);
+  fill_history(batch, cell.robot);
   std::vector<bool> is_held_out = hold_out(batch);
   return CheckedBatch(std::move(batch), std::move(is_held_out), std::move(hash));
 }

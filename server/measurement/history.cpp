@@ -18,21 +18,22 @@ bool is_in_order(const Rows& rows) {
                         [](const Measurement& a, const Measurement& b) { return *a.context.time < *b.context.time; });
 }
 
-/// Whether the robot can have come to `now` from `before` by the approach directions that were recorded.
-bool may_come_from(const JointVector& before, const PoseContext& now) {
+/// Whether the robot can have come to `now` from `before` by the sides of the gears that were recorded.
+bool may_come_from(const JointVector& before, const PoseContext& now, const Chain& robot) {
   if (before.size() != now.q.size()) return false;
+  if (now.direction.empty()) return true;
+  const JointVector way = robot.gear_angles(now.q - before);
   for (std::size_t j = 0; j < now.direction.size(); ++j) {
-    const auto joint = static_cast<Eigen::Index>(j);
-    if (now.direction[j] * (now.q(joint) - before(joint)) < 0) return false;
+    if (now.direction[j] * way(static_cast<Eigen::Index>(j)) < 0) return false;
   }
   return true;
 }
 
-void fill_before(const Rows& rows) {
+void fill_before(const Rows& rows, const Chain& robot) {
   for (std::size_t i = 1; i < rows.size(); ++i) {
     PoseContext& now = rows[i].context;
     const JointVector& before = rows[i - 1].context.q;
-    if (!now.velocity && may_come_from(before, now)) now.before = before;
+    if (!now.velocity && may_come_from(before, now, robot)) now.before = before;
   }
 }
 
@@ -58,7 +59,7 @@ void fill_lagged(const Rows& rows) {
 
 }  // namespace
 
-void fill_history(MeasurementBatch& batch) {
+void fill_history(MeasurementBatch& batch, const Chain& robot) {
   const Rows all(batch.measurements);
   for (Measurement& m : all) {
     m.context.before.reset();
@@ -69,7 +70,7 @@ void fill_history(MeasurementBatch& batch) {
     while (end < all.size() && all[end].session == all[first].session) ++end;
     const Rows session = all.subspan(first, end - first);
     if (is_in_order(session)) {
-      fill_before(session);
+      fill_before(session, robot);
       fill_lagged(session);
     }
     first = end;

@@ -394,6 +394,37 @@ TEST(ModelFile, ABiasThatNobodyCouldServeIsRefused) {
             Refusal("cell.model", {}, "bias"));
 }
 
+/// A model of `source` on an arm whose joint 3 follows joint 2, with `change` done to its content.
+std::string coupled(const std::string& source, const std::function<void(json& content)>& change) {
+  std::string robot = test::small_robot_yaml();
+  const std::string none = "coupling: []";
+  robot.replace(robot.find(none), none.size(), "coupling: [{joint: 3, follows: 2, ratio: -1}]");
+  const auto cell =
+      std::make_shared<const Cell>(test::demand(parse_cell(test::small_cell_yaml("cell-1"), robot, "cell.yaml")));
+  CompensatedModel::Parts parts = test::nominal_model(cell, 40).parts();
+  parts.physics = test::demand(make_physical_model(cell, {source}));
+  const auto P = parts.physics.values.size();
+  parts.covariance = Eigen::MatrixXd::Identity(P, P) * 1e-8;
+  for (const Parameter& p : parts.physics.parameters()) parts.parameters.push_back({p, p.prior, 1e-4, true});
+  parts.rank = static_cast<int>(P);
+  parts.provenance.trained_at = 1'700'000'000;
+  json file = json::parse(serialize(test::demand(CompensatedModel::make(std::move(parts)))));
+  change(file["content"]);
+  file["hash"] = sha256_hex(file["content"].dump());
+  return file.dump();
+}
+
+TEST(ModelFile, WhoseCausesOfACoupledJointFollowedTheCommandedAngleIsToBeTrainedAgain) {
+  const auto as_before = [](json& content) { content.erase("angles"); };
+  for (const char* source : {"gear_transmission:3@48.5", "backlash:2", "joint_map:3@2", "encoder_eccentricity:3",
+                             "joint_slip:2@5", "early_reading"}) {
+    EXPECT_EQ(refusal_with(coupled(source, as_before)), Refusal("cell.model", {}, "angles").text(source));
+    EXPECT_EQ(refusal_with(coupled(source, [](json&) {})), Refusal::none()) << source;
+  }
+  for (const char* source : {"base", "geometry", "tool", "backlash:5", "link_bending:2"})
+    EXPECT_EQ(refusal_with(coupled(source, as_before)), Refusal::none()) << source;
+}
+
 TEST(ModelFile, ADeviceThatNeverEndsIsNoModel) {
   const Result<CompensatedModel> endless = load_model("/dev/zero");
   ASSERT_FALSE(endless);

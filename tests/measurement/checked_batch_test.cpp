@@ -78,7 +78,7 @@ TEST(CheckedBatch, PutsPosesIntoTheOrderOfTheirTimesEachWithItsRowAndItsPart) {
   backwards.measurements[0].set = MeasurementSet::kValidation;
   const CheckedBatch batch = checked(backwards);
   EXPECT_FALSE(batch.is_in_order_of_time());
-  const CheckedBatch ordered = batch.in_order_of_time();
+  const CheckedBatch ordered = batch.in_order_of_time(test::cell_7()->robot);
   EXPECT_TRUE(ordered.is_in_order_of_time());
   std::vector<int> expected = rows_of(backwards);
   std::reverse(expected.begin(), expected.end());

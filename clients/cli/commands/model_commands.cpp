@@ -123,7 +123,7 @@ std::optional<Jump> jump_beside(const CompensatedModel& model, const CheckedBatc
   cell->model.error_sources.clear();
   for (const ErrorSourcePtr& source : model.parts().physics.sources)
     cell->model.error_sources.push_back(source->name());
-  return jump_within(cell, batch.in_order_of_time().rows());
+  return jump_within(cell, batch.in_order_of_time(cell->robot).rows());
 }
 
 std::string jump_text(const std::optional<Jump>& jump) {

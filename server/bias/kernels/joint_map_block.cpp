@@ -61,12 +61,14 @@ class JointMapBlock final : public LinearBlock {
     return of_joints(shape, {kAmplitudeSpread, kKneeSpread, kPowerSpread}, kHarmonicsSpread);
   }
 
-  // For each joint J_j, then J_j cos(h q_j) and J_j sin(h q_j). A harmonic is the one before, turned by q_j.
+  // For each joint J_j, then J_j cos(h g_j) and J_j sin(h g_j), g_j the angle of its gear. A harmonic is the one
+  // before, turned by g_j.
   void columns(const JointVector& q, const BiasFeatures& features, Eigen::Ref<MatrixXd> out) const override {
+    const JointVector& gears = features.gears.size() > 0 ? features.gears : q;
     for (Index j = 0; j < features.by_joint.cols(); ++j) {
       const Vector6 J = features.by_joint.col(j);
-      const double cosine = std::cos(q[j]);
-      const double sine = std::sin(q[j]);
+      const double cosine = std::cos(gears[j]);
+      const double sine = std::sin(gears[j]);
       double c = 1;
       double s = 0;
       out.col(columns_of_joint() * j) = J;

@@ -17,6 +17,7 @@ struct BiasFeatures {
   Eigen::MatrixXd by_parameter;        ///< 6 x P, per prior standard deviation of the parameter
   Vector3 lever_F = Vector3::Zero();   ///< m: the tool's point, seen from the flange
   Matrix3 R_BF = Matrix3::Identity();  ///< how the flange stands
+  JointVector gears = {};              ///< rad: the angles of the gears; empty where they are the joints' own
 };
 
 /// One block of columns of H. A value without state: its hyperparameters are passed in as natural logarithms.
@@ -43,8 +44,8 @@ class LinearBlock {
 
 using LinearBlockPtr = std::shared_ptr<const LinearBlock>;
 
-/// An error of each joint's angle that depends on that angle alone: Σ_j J_j(q) k_j(q_j, q_j') J_j(q')ᵀ. k_j is a Matérn
-/// 3/2 kernel on the circle in a Fourier basis: periodic and once differentiable.
+/// An error of each gear that depends on that gear's angle alone: Σ_j J_j(q) k_j(g_j, g_j') J_j(q')ᵀ, g_j the angle of
+/// gear j. k_j is a Matérn 3/2 kernel on the circle in a Fourier basis: periodic and once differentiable.
 /// Hyperparameters of each joint: log amplitude, rad; log of the harmonic from which on the spectrum falls.
 [[nodiscard]] LinearBlockPtr make_joint_map_block();
 /// What errors of the physical parameters leave, identified or not: H = J_θ(q). No hyperparameters: the weights have

@@ -1,5 +1,8 @@
 #include "server/compensate/file/read_parts.h"
 
+#include <algorithm>
+
+#include "server/bias/kernels/kernel_spelling.h"
 #include "server/compensate/file/json_values.h"
 #include "server/compensate/file/keys.h"
 
@@ -281,6 +284,42 @@ Status read_bias(const Json& content, const std::string& where, ModelParts& part
   return {};
 }
 
+/// Whether the cause is a function of the angle of a joint that a coupling concerns, or turns it.
+bool is_of_coupled_joint(const ErrorSource& source, const Chain& robot) {
+  const CauseRecord& cause = source.cause();
+  const bool turns = cause.acts.on == causes::ActsOn::kJoints || cause.scope == causes::Scope::kJoint;
+  if (!turns || cause.gives_way) return false;
+  const int joint = source.joint();
+  return std::any_of(robot.couplings().begin(), robot.couplings().end(), [joint](const Coupling& coupling) {
+    return joint < 0 || joint == coupling.joint || joint == coupling.follows;
+  });
+}
+
+/// What a model has of coupled joints, as its file spells it; empty where it has nothing.
+std::string learned_of_coupled_joints(const ModelParts& parts) {
+  const Chain& robot = parts.physics.cell->robot;
+  const auto of_coupled = [&](const ErrorSourcePtr& source) { return is_of_coupled_joint(*source, robot); };
+  const auto found = std::find_if(parts.physics.sources.begin(), parts.physics.sources.end(), of_coupled);
+  if (found != parts.physics.sources.end()) return (*found)->name();
+  const Result<SpelledBias> bias = spelled_bias(parts.bias ? parts.bias->kernel : "");
+  return bias && bias->has("joint_map") && !robot.couplings().empty() ? parts.bias->kernel : "";
+}
+
+/// Once, causes of coupled joints were functions of the commanded angle on every arm, and files said nothing of it.
+Status check_angles(const Json& content, const std::string& where, const ModelParts& parts) {
+  if (content.value("angles", "") == kAngles) return {};
+  const std::string learned = learned_of_coupled_joints(parts);
+  if (learned.empty()) return {};
+  return refused(
+             "its `{}` was learned when causes of coupled joints followed the commanded angles and not those of the "
+             "gears, and would answer otherwise now",
+             learned)
+      .in(where)
+      .of("angles")
+      .with_text(learned)
+      .next("train it again");
+}
+
 ModelProvenance provenance_from(const Json& json, const Json& stamp) {
   ModelProvenance provenance;
   provenance.level = json.at("level");
@@ -314,6 +353,7 @@ Result<ModelParts> parts_from(const Json& content, const Json& stamp, const std:
   read_domain(content, parts);
   parts.training = evaluation_from(content.at("training"));
   if (const Status read = read_bias(content, where, parts); !read) return tl::make_unexpected(read.error());
+  if (const Status same = check_angles(content, where, parts); !same) return tl::make_unexpected(same.error());
   if (content.contains("validation")) parts.validation = evaluation_from(content.at("validation"));
   parts.provenance = provenance_from(content.at("provenance"), stamp);
   return parts;

@@ -243,6 +243,7 @@ Json content_of(const ModelParts& parts) {
   Json content = json_of(parts.physics);
   content["cell_yaml"] = parts.physics.cell->cell_yaml;
   content["robot_yaml"] = parts.physics.cell->robot_yaml;
+  if (!parts.physics.cell->robot.couplings().empty()) content["angles"] = kAngles;
   add_calibration(parts, content);
   add_domain(parts, content);
   add_bias(parts, content);

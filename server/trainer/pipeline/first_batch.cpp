@@ -26,7 +26,7 @@ std::shared_ptr<const Cell> with_sources(const std::shared_ptr<const Cell>& cell
 std::optional<Error> doubt_of_first_batch(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                           const std::optional<std::string>& level) {
   if (auto doubt = batch_doubt(batch.rows(), *cell)) return doubt;
-  const auto jump = jump_within(with_sources(cell, level), batch.in_order_of_time().rows());
+  const auto jump = jump_within(with_sources(cell, level), batch.in_order_of_time(cell->robot).rows());
   if (!jump) return std::nullopt;
   return refused("something changed in the middle of it, {}; no single arm fits the poses before and after",
                  in_words(*jump))
