@@ -116,7 +116,8 @@ Evaluation evaluation_of(const trammel::Evaluation& e) {
                  {},
                  {},
                  doubt_of_bias(e).value_or(""),
-                 0};
+                 0,
+                 e.coverage_95_stated};
   if (e.nlpd) out.nlpd = nlpd_in_mm(*e.nlpd);
   if (const auto& o = e.orientation) {
     out.orientation =

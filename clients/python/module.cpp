@@ -213,6 +213,7 @@ py::dict to_python(const api::Evaluation& e) {
   out["levels"] = py::dict("nominal"_a = to_python(e.nominal), "calibrated"_a = to_python(e.calibrated),
                            "compensated"_a = to_python(e.compensated));
   out["coverage_95"] = e.coverage_95;
+  if (e.coverage_95_stated) out["coverage_95_stated"] = *e.coverage_95_stated;
   out["in_domain"] = e.in_domain;
   if (e.nlpd) out["nlpd"] = *e.nlpd;
   if (e.orientation) out["orientation"] = to_python(*e.orientation);

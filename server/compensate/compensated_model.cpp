@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "server/base/check.h"
-#include "server/base/coverage.h"
 #include "server/bias/kernels/kernel_spelling.h"
 #include "server/compensate/file/write_parts.h"
 #include "server/measurement/gauges.h"
@@ -266,17 +265,25 @@ CompensatedModel::LevelErrors CompensatedModel::errors_B(const MeasurementBatch&
 
 namespace {
 
-GaugeFigures figures_of(const CompensatedModel::GaugeErrors& errors) {
+/// m, the stated sigma of each row.
+Eigen::VectorXd stated_sigmas(const MeasurementBatch& batch, const Cell& cell) {
+  Eigen::VectorXd sigmas(std::ssize(batch.measurements));
+  for (Eigen::Index i = 0; i < sigmas.size(); ++i)
+    sigmas(i) = batch.measurements[static_cast<std::size_t>(i)].sigma.value_or(cell.tracker.sigma);
+  return sigmas;
+}
+
+/// `stated`: of the rows that the errors are of.
+GaugeFigures figures_of(const CompensatedModel::GaugeErrors& errors, const Eigen::VectorXd& stated) {
   const auto rms = [](const Eigen::VectorXd& e) { return std::sqrt(e.squaredNorm() / static_cast<double>(e.size())); };
-  const Eigen::ArrayXd inside =
-      (errors.compensated.array().abs() <= kInterval95 * errors.stddev.array()).cast<double>();
   return {static_cast<int>(errors.rows.size()),
           rms(errors.nominal),
           rms(errors.calibrated),
           rms(errors.compensated),
           errors.compensated.cwiseAbs().maxCoeff(),
-          inside.mean(),
-          static_cast<int>(std::count(errors.in_domain.begin(), errors.in_domain.end(), true))};
+          coverage_95(errors.compensated.transpose(), errors.stddev.transpose()),
+          static_cast<int>(std::count(errors.in_domain.begin(), errors.in_domain.end(), true)),
+          coverage_95(errors.compensated.transpose(), stated.transpose())};
 }
 
 }  // namespace
@@ -288,7 +295,8 @@ Evaluation CompensatedModel::evaluate(const MeasurementBatch& batch) const {
   evaluation.nominal = evaluation.calibrated = evaluation.compensated = no_figures();
   evaluation.coverage_95 = std::numeric_limits<double>::quiet_NaN();
   if (!positions.measurements.empty()) evaluation = evaluate_positions(positions);
-  evaluation.gauges = figures_of(gauge_errors(batch));
+  const GaugeErrors errors = gauge_errors(batch);
+  evaluation.gauges = figures_of(errors, stated_sigmas(batch, cell())(errors.rows));
   return evaluation;
 }
 
@@ -300,6 +308,8 @@ Evaluation CompensatedModel::evaluate_positions(const MeasurementBatch& batch) c
   evaluation.calibrated = figures_of(errors.calibrated);
   evaluation.compensated = figures_of(errors.compensated);
   evaluation.coverage_95 = coverage_95(errors.compensated, errors.stddev);
+  evaluation.coverage_95_stated =
+      coverage_95(errors.compensated, stated_sigmas(batch, cell()).transpose().replicate<3, 1>());
   evaluation.in_domain = static_cast<int>(std::count(errors.in_domain.begin(), errors.in_domain.end(), true));
   evaluation.nlpd = negative_log_density(errors.compensated, errors.stddev);
   if (inside_->bias) evaluation.bias_gain_z = paired_gain(errors.calibrated, errors.compensated).z();

@@ -58,7 +58,7 @@ std::optional<double> negative_log_density(const Eigen::Matrix3Xd& error, const 
   return std::isfinite(mean) ? std::optional(mean) : std::nullopt;
 }
 
-double coverage_95(const Eigen::Matrix3Xd& error, const Eigen::Matrix3Xd& stddev) {
+double coverage_95(const Eigen::MatrixXd& error, const Eigen::MatrixXd& stddev) {
   return (error.array().abs() <= kInterval95 * stddev.array()).cast<double>().mean();
 }
 

@@ -34,6 +34,7 @@ struct GaugeFigures {
   double max = 0;                                       ///< of compensated, magnitude
   double coverage_95 = 0;                               ///< share of rows inside their 95 % interval
   int in_domain = 0;
+  std::optional<double> coverage_95_stated;  ///< as Evaluation::coverage_95_stated
 };
 
 /// The three levels of one model on the same poses.
@@ -51,12 +52,16 @@ struct Evaluation {
   /// For a model with a bias, PairedGain::z() of compensated against calibrated; empty in models from before it was
   /// kept.
   std::optional<double> bias_gain_z;
+  /// Share of coordinates inside the 95 % interval of the stated sigma alone. Intervals that were widened until they
+  /// held show nothing; this share shows whether the model is as good as the instrument. Empty in models from before it
+  /// was kept.
+  std::optional<double> coverage_95_stated;
 };
 [[nodiscard]] double nlpd_in_mm(double nlpd_in_m);
 
 /// Mean over the coordinates of -log N(error; 0, stddev²), nat; empty where a stddev is 0.
 [[nodiscard]] std::optional<double> negative_log_density(const Eigen::Matrix3Xd& error, const Eigen::Matrix3Xd& stddev);
-/// Share of coordinates inside their 95 % interval.
-[[nodiscard]] double coverage_95(const Eigen::Matrix3Xd& error, const Eigen::Matrix3Xd& stddev);
+/// Share of coordinates inside their 95 % interval; a column for each row that was measured.
+[[nodiscard]] double coverage_95(const Eigen::MatrixXd& error, const Eigen::MatrixXd& stddev);
 
 }  // namespace trammel

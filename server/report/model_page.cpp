@@ -187,6 +187,8 @@ std::string provenance_rows(const CompensatedModel& model, const Evaluation& eva
   if (evaluation.poses > 0) {
     add("compared poses in domain", fmt::format("{} of {}", evaluation.in_domain, evaluation.poses));
     add("inside their 95 % interval", fmt::format("{:.1f} % of coordinates", 100 * evaluation.coverage_95));
+    if (const auto stated = evaluation.coverage_95_stated)
+      add("inside that of the stated sigma alone", fmt::format("{:.1f} % of coordinates", 100 * *stated));
   }
   if (const auto& gauges = evaluation.gauges) {
     add("distances and touches",

@@ -1,7 +1,6 @@
-#include "server/compensate/stated_coverage.h"
-
 #include <gtest/gtest.h>
 
+#include "server/compensate/compensated_model.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 
@@ -21,8 +20,9 @@ double share(double times) {
   MeasurementBatch batch = test::measured(robot, 400, 3, false);
   for (Measurement& m : batch.measurements) m.p_W += Vector3::Constant(times * cell->tracker.sigma);
   const CompensatedModel model = test::demand(CompensatedModel::make(std::move(parts)));
-  EXPECT_EQ(model.evaluate(batch).coverage_95, 1);
-  return stated_coverage(model, batch);
+  const Evaluation evaluation = model.evaluate(batch);
+  EXPECT_EQ(evaluation.coverage_95, 1);
+  return evaluation.coverage_95_stated.value();
 }
 
 TEST(StatedCoverage, IsThatOfTheInstrumentAloneHoweverWideTheIntervalsAre) {

@@ -120,8 +120,8 @@ class Offline(unittest.TestCase):
 
     def test_evaluates_with_the_keys_and_figures_of_the_command_line(self):
         printed = json.loads(command_line("evaluate", "--model", self.model_path, "--batch", self.batch_path, "--json", "-"))
-        for only_printed in ("structure", "coverage_95_stated"):
-            printed.pop(only_printed, None)
+        printed.pop("structure", None)
+        self.assertIn("coverage_95_stated", printed)
         self.assertEqual(printed.pop("notes"), self.model.notes)
         self.assertEqual(printed.pop("measured"), json.loads(json.dumps(self.model.measured)))
         here = self.model.evaluate(trammel.Batch.load(self.batch_path))

@@ -56,6 +56,13 @@ TEST_F(ModelPage, ShowsWhereTheModelComesFromAndItsParameters) {
   }
 }
 
+TEST_F(ModelPage, SaysCoverageAgainstTheStatedSigmaBesideThatOfItsOwnIntervals) {
+  const CompensatedModel model = trained("none");
+  const double stated = model.parts().training.coverage_95_stated.value();
+  EXPECT_TRUE(has(model_page(model, std::nullopt), fmt::format("{:.1f} % of coordinates", 100 * stated)));
+  EXPECT_TRUE(has(model_page(model, std::nullopt), "inside that of the stated sigma alone"));
+}
+
 TEST_F(ModelPage, CallsErrorSourcesByTheirPlainNames) {
   CompensatedModel::Parts parts = trained("none").parts();
   parts.provenance.level = "base,geometry,compliance_linear,gear_transmission:3@48.5";

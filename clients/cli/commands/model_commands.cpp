@@ -17,7 +17,6 @@
 #include "server/compensate/known_rows.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
-#include "server/compensate/stated_coverage.h"
 #include "server/compensate/world.h"
 #include "server/diagnose/triage.h"
 #include "server/error_sources/cause_words.h"
@@ -149,12 +148,6 @@ Status check_first_batch(const TrainArguments& arguments, const std::shared_ptr<
   return Failure(std::move(*doubt)).in("batch " + batch.id());
 }
 
-/// Of the poses that are shown: those held out, or else the training poses.
-std::string stated_coverage_text(const CompensatedModel& model, const CheckedBatch& batch) {
-  const Result<InWorld> world = in_world_of(model, model.parts().validation ? batch.held_out() : batch.training());
-  return world ? stated_coverage_line(stated_coverage(model, world->batch)) : "";
-}
-
 Status train_model(const TrainArguments& arguments) {
   if (arguments.bias) {
     if (const Status spelled = check_bias_spelling(*arguments.bias); !spelled)
@@ -207,8 +200,7 @@ Status train_model(const TrainArguments& arguments) {
                                    evaluation_table(*parts.validation)
                              : fmt::format("on the {} poses of batch {} it was trained on (none were held out):\n",
                                            rows_of(parts.training), parts.provenance.figures_batch_id()) +
-                                   evaluation_table(parts.training)) +
-           stated_coverage_text(*model, *batch),
+                                   evaluation_table(parts.training)),
        {arguments.output, arguments.json});
   nlohmann::ordered_json json = model_json(*model);
   if (options.fleet) json["unlike_twins"] = unlike_json(unlike);
@@ -272,11 +264,9 @@ Status evaluate(const EvaluateArguments& arguments) {
   const auto learned = std::count_if(world->batch.measurements.begin(), world->batch.measurements.end(),
                                      LearnedFrom(*model, batch->hash()));
   const std::string structure = positions.measurements.empty() ? "" : structure_note(*model, positions, errors);
-  const double stated = stated_coverage(*model, world->batch);
   tell(fmt::format("model {} on {} poses of {}:\n", model->provenance().id, rows_of(evaluation), batch->id()) +
-           evaluation_table(evaluation) + stated_coverage_line(stated) + "the model rests on " +
-           in_words(model->parts().measured, model->cell()) + "\n" + located_text(*world) + learned_text(learned) +
-           (structure.empty() ? "" : "note: " + structure + "\n"),
+           evaluation_table(evaluation) + "the model rests on " + in_words(model->parts().measured, model->cell()) +
+           "\n" + located_text(*world) + learned_text(learned) + (structure.empty() ? "" : "note: " + structure + "\n"),
        {arguments.json, arguments.residuals});
   if (!arguments.residuals.empty()) {
     const Status written =
@@ -287,7 +277,6 @@ Status evaluate(const EvaluateArguments& arguments) {
   }
   warn_of_foreign_poses(*model, world->batch);
   nlohmann::ordered_json json = evaluation_json(evaluation);
-  json["coverage_95_stated"] = stated;
   json["measured"] = measured_json(*model);
   json["notes"] = notes_json(notes);
   if (!structure.empty()) json["structure"] = structure;

@@ -46,26 +46,36 @@ std::string orientation_lines(const std::optional<OrientationFigures>& orientati
   return text + "\n";
 }
 
+/// Where it is the share of no model that is as good as its instrument.
+std::string stated_coverage_line(std::optional<double> share) {
+  constexpr double kFar = 0.5;  // a model that leaves as much again as the instrument has 0.83
+  if (!share || *share >= kFar) return "";
+  return fmt::format("  {:.1f} % are inside the 95 % interval of the stated sigma alone\n", 100 * *share);
+}
+
 std::string gauge_lines(const std::optional<GaugeFigures>& gauges) {
   if (!gauges) return "";
-  return fmt::format(
+  const std::string text = fmt::format(
       "  distances and touches, mm rms of {} values (of the value, not of a position): nominal {:.4f}, calibrated "
       "{:.4f}, compensated {:.4f}, max {:.4f}; {} in domain; {:.1f} % inside their 95 % interval\n",
       gauges->rows, to_mm(gauges->nominal), to_mm(gauges->calibrated), to_mm(gauges->compensated), to_mm(gauges->max),
       gauges->in_domain, 100 * gauges->coverage_95);
+  return text + stated_coverage_line(gauges->coverage_95_stated);
 }
 
 ordered_json gauges_json(const GaugeFigures& gauges) {
   const auto level = [](double rms) { return ordered_json{{"rms_mm", to_mm(rms)}}; };
-  return {{"rows", gauges.rows},
-          {"rms_mm", to_mm(gauges.compensated)},
-          {"max_mm", to_mm(gauges.max)},
-          {"levels",
-           {{"nominal", level(gauges.nominal)},
-            {"calibrated", level(gauges.calibrated)},
-            {"compensated", level(gauges.compensated)}}},
-          {"coverage_95", gauges.coverage_95},
-          {"in_domain", gauges.in_domain}};
+  ordered_json json = {{"rows", gauges.rows},
+                       {"rms_mm", to_mm(gauges.compensated)},
+                       {"max_mm", to_mm(gauges.max)},
+                       {"levels",
+                        {{"nominal", level(gauges.nominal)},
+                         {"calibrated", level(gauges.calibrated)},
+                         {"compensated", level(gauges.compensated)}}},
+                       {"coverage_95", gauges.coverage_95},
+                       {"in_domain", gauges.in_domain}};
+  if (gauges.coverage_95_stated) json["coverage_95_stated"] = *gauges.coverage_95_stated;
+  return json;
 }
 
 ordered_json orientation_json(const OrientationFigures& orientation) {
@@ -87,14 +97,8 @@ std::string evaluation_table(const Evaluation& evaluation) {
          figures_line("compensated", evaluation.compensated) +
          fmt::format("  {} of {} poses in domain; {:.1f} % of coordinates inside their 95 % interval\n",
                      evaluation.in_domain, evaluation.poses, 100 * evaluation.coverage_95) +
-         nlpd_line(evaluation) + orientation_lines(evaluation.orientation) + gauge_lines(evaluation.gauges) +
-         doubt_line(evaluation);
-}
-
-std::string stated_coverage_line(double share) {
-  constexpr double kFar = 0.5;  // a model that leaves as much again as the instrument has 0.83
-  if (share >= kFar) return "";
-  return fmt::format("  {:.1f} % are inside the 95 % interval of the stated sigma alone\n", 100 * share);
+         stated_coverage_line(evaluation.coverage_95_stated) + nlpd_line(evaluation) +
+         orientation_lines(evaluation.orientation) + gauge_lines(evaluation.gauges) + doubt_line(evaluation);
 }
 
 std::string residuals_csv(const MeasurementBatch& batch, const CompensatedModel::LevelErrors& errors) {
@@ -152,6 +156,7 @@ ordered_json evaluation_json(const Evaluation& evaluation) {
                     {"calibrated", figures_json(evaluation.calibrated)},
                     {"compensated", figures_json(evaluation.compensated)}};
   json["coverage_95"] = evaluation.coverage_95;
+  if (evaluation.coverage_95_stated) json["coverage_95_stated"] = *evaluation.coverage_95_stated;
   json["in_domain"] = evaluation.in_domain;
   if (evaluation.nlpd) json["nlpd"] = nlpd_in_mm(*evaluation.nlpd);
   if (evaluation.orientation) json["orientation"] = orientation_json(*evaluation.orientation);

@@ -10,8 +10,6 @@ namespace trammel::cli {
 
 /// `nominal`, `calibrated` and `compensated`, a line each, mm.
 [[nodiscard]] std::string evaluation_table(const Evaluation& evaluation);
-/// stated_coverage(), where it is that of no model that is as good as its instrument; else empty.
-[[nodiscard]] std::string stated_coverage_line(double share);
 /// A row a pose: errors (measured - predicted, in B) with and without the bias, stated standard deviations, errors over
 /// them, and whether the pose is a suspect: farther off than one in a million.
 [[nodiscard]] std::string residuals_csv(const MeasurementBatch& batch, const CompensatedModel::LevelErrors& errors);

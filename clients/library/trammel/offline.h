@@ -104,6 +104,9 @@ struct Evaluation {
   std::optional<OrientationErrors> orientation;  ///< where orientations were measured
   std::string doubt_of_bias;                     ///< where the bias does not help, a sentence; else empty
   int trained_on = 0;  ///< of the poses, those that the model was trained on: they say how well it fits
+  /// Share of coordinates inside the 95 % interval of the stated sigma alone: whether the model is as good as the
+  /// instrument.
+  std::optional<double> coverage_95_stated;
 };
 
 /// One identified parameter of a model.

@@ -35,9 +35,9 @@ OrientationFigures orientation_from(const Json& json) {
 }
 
 GaugeFigures gauges_from(const Json& json) {
-  return {count_from(json, "rows"),           number_from(json, "nominal_m"), number_from(json, "calibrated_m"),
-          number_from(json, "compensated_m"), number_from(json, "max_m"),     number_from(json, "coverage_95"),
-          count_from(json, "in_domain")};
+  return {count_from(json, "rows"),           number_from(json, "nominal_m"),       number_from(json, "calibrated_m"),
+          number_from(json, "compensated_m"), number_from(json, "max_m"),           number_from(json, "coverage_95"),
+          count_from(json, "in_domain"),      number_if(json, "coverage_95_stated")};
 }
 
 Evaluation evaluation_from(const Json& json) {
@@ -56,6 +56,7 @@ Evaluation evaluation_from(const Json& json) {
   e.in_domain = count_from(json, "in_domain");
   e.nlpd = number_if(json, "nlpd_of_m");
   e.bias_gain_z = number_if(json, "bias_gain_z");
+  e.coverage_95_stated = number_if(json, "coverage_95_stated");
   if (json.contains("orientation")) e.orientation = orientation_from(json.at("orientation"));
   return e;
 }

@@ -27,13 +27,15 @@ Json json_of(const OrientationFigures& o) {
 }
 
 Json json_of(const GaugeFigures& g) {
-  return {{"rows", g.rows},
-          {"nominal_m", g.nominal},
-          {"calibrated_m", g.calibrated},
-          {"compensated_m", g.compensated},
-          {"max_m", g.max},
-          {"coverage_95", g.coverage_95},
-          {"in_domain", g.in_domain}};
+  Json json = {{"rows", g.rows},
+               {"nominal_m", g.nominal},
+               {"calibrated_m", g.calibrated},
+               {"compensated_m", g.compensated},
+               {"max_m", g.max},
+               {"coverage_95", g.coverage_95},
+               {"in_domain", g.in_domain}};
+  if (g.coverage_95_stated) json["coverage_95_stated"] = *g.coverage_95_stated;
+  return json;
 }
 
 Json json_of(const Evaluation& e) {
@@ -46,6 +48,7 @@ Json json_of(const Evaluation& e) {
                {"in_domain", e.in_domain}};
   if (e.nlpd) json["nlpd_of_m"] = *e.nlpd;
   if (e.bias_gain_z) json["bias_gain_z"] = *e.bias_gain_z;
+  if (e.coverage_95_stated) json["coverage_95_stated"] = *e.coverage_95_stated;
   if (e.orientation) json["orientation"] = json_of(*e.orientation);
   if (e.gauges) json["gauges"] = json_of(*e.gauges);
   return json;
