@@ -274,8 +274,10 @@ Result<int> Session::import_model(const std::string& cell, const std::string& te
   return *version;
 }
 
-Result<int> Session::roll_back(const std::string& cell, const std::string& reason) const {
+Result<int> Session::roll_back(const std::string& cell, const std::string& reason,
+                               std::optional<int> expected_version) const {
   client::ChangeOptions change;
+  change.expected_version = expected_version;
   change.reason = reason;
   const auto now = inside_->session->rollback(cell, change);
   if (!now) return passed_on(now);

@@ -597,10 +597,11 @@ void add_session_changes(py::class_<Session>& session) {
           "cell"_a, "version"_a, "reason"_a, "expected_version"_a, "force"_a)
       .def(
           "roll_back",
-          [](const Session& s, const std::string& cell, const std::string& reason) {
-            return value_or_raise(unlocked([&] { return s.roll_back(cell, reason); }));
+          [](const Session& s, const std::string& cell, const std::string& reason,
+             std::optional<int> expected_version) {
+            return value_or_raise(unlocked([&] { return s.roll_back(cell, reason, expected_version); }));
           },
-          "cell"_a, "reason"_a);
+          "cell"_a, "reason"_a, "expected_version"_a);
 }
 
 }  // namespace

@@ -842,10 +842,17 @@ TEST_F(CommandLineWithService, VersionsAreRetrainedActivatedRolledBackAndImporte
                            "next: trammel rollback --service --cell cell-7 puts version 1"}) {
     EXPECT_NE(activated.out.find(part), std::string::npos) << part << " is not in:\n" << activated.out;
   }
-  EXPECT_NE(must_answer({"rollback", "--cell", "cell-7"}).out.find("version 1 in force"), std::string::npos);
+  const Finished late = ask({"rollback", "--cell", "cell-7", "--expected", "1"});
+  EXPECT_EQ(late.exit_code, kRefusedData);
+  EXPECT_NE(late.err.find("version 2 is in force, not 1 as expected"), std::string::npos) << late.err;
+  EXPECT_NE(must_answer({"rollback", "--cell", "cell-7", "--expected", "2"}).out.find("version 1 in force"),
+            std::string::npos);
   must_answer({"export", "--model", "cell-7@2", "-o", file("second.model")});
   EXPECT_EQ(imported(file("second.model")), 2) << "the service has it already";
   EXPECT_EQ(imported(train(measure("other", 30, 3), "M1")), 3);
+  EXPECT_EQ(ask({"release", "--cell", "cell-7", "--batch", "lt-01", "--expected", "2"}).exit_code, kRefusedData);
+  EXPECT_EQ(ask({"discard", "--cell", "cell-7", "--batch", "lt-01", "--expected", "2"}).exit_code, kRefusedData);
+  must_answer({"discard", "--cell", "cell-7", "--batch", "lt-01"});
 }
 
 TEST_F(CommandLineWithService, ACheckIsAnsweredThereAsOnFilesAndTheServiceKeepsWhatItSaid) {

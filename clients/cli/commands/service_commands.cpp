@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <optional>
 #include <type_traits>
 
 #include "clients/cli/commands/commands.h"
@@ -28,6 +29,7 @@ using nlohmann::ordered_json;
 struct ServiceArguments {
   std::string cell, batch, batch_id, level, bias, model, output, json, reason;
   std::vector<std::string> batch_ids;
+  std::optional<int> expected;
   std::int64_t job = 0;
   bool watch = false, release = false, force = false;
   double limit_s = 3600;
@@ -186,32 +188,50 @@ Status list_batches(client::Session& session, const ServiceArguments& arguments)
   return write_json(arguments.json, {{"batches", batches_json(*batches)}});
 }
 
-client::ChangeOptions because(const ServiceArguments& arguments) {
+/// The version that the service's record has in force; 0: none. Empty: not among the versions that a list has.
+Result<std::optional<int>> version_in_force(client::Session& session, const std::string& cell) {
+  const Result<std::vector<client::ModelInfo>> models = session.models(cell);
+  if (!models) return tl::make_unexpected(models.error());
+  if (models->empty()) return std::optional(0);
+  const auto in_force = std::find_if(models->begin(), models->end(), [](const auto& model) { return model.in_force; });
+  if (in_force != models->end()) return std::optional(in_force->version);
+  return models->front().version == 1 ? std::optional(0) : std::nullopt;
+}
+
+/// A change that is refused where another version is in force than the user saw or, where that is not said, than there
+/// is now.
+Result<client::ChangeOptions> decided_against(client::Session& session, const std::string& cell,
+                                              const ServiceArguments& arguments) {
   client::ChangeOptions change;
   change.reason = arguments.reason;
+  change.expected_version = arguments.expected;
+  if (change.expected_version) return change;
+  const auto now = version_in_force(session, cell);
+  if (!now) return tl::make_unexpected(now.error());
+  change.expected_version = *now;
   return change;
 }
 
+using BatchChange = Status (client::Session::*)(const std::string&, const std::string&, const client::ChangeOptions&);
+
 /// `now`: what the batch is afterwards.
-Status quarantine_changed(const std::string& cell, const std::string& batch, const Status& changed, const char* now,
-                          const ServiceArguments& arguments) {
-  if (!changed) return changed;
-  tell(fmt::format("cell {}: batch {} is {}\n", cell, batch, now), {arguments.json});
-  return write_json(arguments.json, {{"cell", cell}, {"batch", batch}, {"is", now}});
+Status change_batch(client::Session& session, const ServiceArguments& arguments, BatchChange change, const char* now) {
+  const Result<std::string> cell = cell_id(arguments.cell);
+  if (!cell) return tl::make_unexpected(cell.error());
+  const Result<client::ChangeOptions> options = decided_against(session, *cell, arguments);
+  if (!options) return tl::make_unexpected(options.error());
+  const std::string& batch = arguments.batch_id;
+  if (const Status changed = (session.*change)(*cell, batch, *options); !changed) return changed;
+  tell(fmt::format("cell {}: batch {} is {}\n", *cell, batch, now), {arguments.json});
+  return write_json(arguments.json, {{"cell", *cell}, {"batch", batch}, {"is", now}});
 }
 
 Status release(client::Session& session, const ServiceArguments& arguments) {
-  const Result<std::string> cell = cell_id(arguments.cell);
-  if (!cell) return tl::make_unexpected(cell.error());
-  return quarantine_changed(*cell, arguments.batch_id, session.release(*cell, arguments.batch_id, because(arguments)),
-                            "released", arguments);
+  return change_batch(session, arguments, &client::Session::release, "released");
 }
 
 Status discard(client::Session& session, const ServiceArguments& arguments) {
-  const Result<std::string> cell = cell_id(arguments.cell);
-  if (!cell) return tl::make_unexpected(cell.error());
-  return quarantine_changed(*cell, arguments.batch_id, session.discard(*cell, arguments.batch_id, because(arguments)),
-                            "discarded", arguments);
+  return change_batch(session, arguments, &client::Session::discard, "discarded");
 }
 
 Status cancel(client::Session& session, const ServiceArguments& arguments) {
@@ -243,9 +263,10 @@ Status activate(client::Session& session, const ServiceArguments& arguments) {
         .of("--model")
         .with_text(arguments.model);
   }
-  client::ChangeOptions options = because(arguments);
-  options.force = arguments.force;
-  const Result<int> version = session.activate(model->cell, model->version, options);
+  Result<client::ChangeOptions> options = decided_against(session, model->cell, arguments);
+  if (!options) return tl::make_unexpected(options.error());
+  options->force = arguments.force;
+  const Result<int> version = session.activate(model->cell, model->version, *options);
   if (!version) return tl::make_unexpected(version.error());
   return now_in_force(session, model->cell, *version, arguments);
 }
@@ -253,7 +274,9 @@ Status activate(client::Session& session, const ServiceArguments& arguments) {
 Status rollback(client::Session& session, const ServiceArguments& arguments) {
   const Result<std::string> cell = cell_id(arguments.cell);
   if (!cell) return tl::make_unexpected(cell.error());
-  const Result<int> version = session.rollback(*cell, because(arguments));
+  const Result<client::ChangeOptions> options = decided_against(session, *cell, arguments);
+  if (!options) return tl::make_unexpected(options.error());
+  const Result<int> version = session.rollback(*cell, *options);
   if (!version) return tl::make_unexpected(version.error());
   return now_in_force(session, *cell, *version, arguments);
 }
@@ -328,8 +351,15 @@ void add_any_cell(CLI::App& command, ServiceArguments& arguments) {
   command.add_option("--cell", arguments.cell, "Cell id, or a cell file (.yaml) that names it; left out: all cells");
 }
 
-void add_reason(CLI::App& command, ServiceArguments& arguments) {
+/// What a person who decides says besides.
+void add_decision(CLI::App& command, ServiceArguments& arguments) {
   command.add_option("--reason", arguments.reason, "Why, for the audit trail");
+  command
+      .add_option(
+          "--expected", arguments.expected,
+          "Version that was in force when you decided (0: none); with another one nothing changes. Left out: the "
+          "one in force now")
+      ->check(CLI::NonNegativeNumber);
 }
 
 void add_watch(CLI::App& command, ServiceArguments& arguments) {
@@ -363,17 +393,17 @@ void add_model_changes(ServiceCommands& commands) {
         command.add_option("--model", arguments.model, "CELL@VERSION, as the command models lists them")->required();
         command.add_flag("--force", arguments.force,
                          "Even if it is worse than the version in force on the poses held out");
-        add_reason(command, arguments);
+        add_decision(command, arguments);
       });
   commands.add("rollback", "Put back in force the model that was before", rollback,
                [](CLI::App& command, ServiceArguments& arguments) {
                  add_cell(command, arguments);
-                 add_reason(command, arguments);
+                 add_decision(command, arguments);
                });
   const auto add_batch = [](CLI::App& command, ServiceArguments& arguments) {
     add_cell(command, arguments);
     command.add_option("--batch", arguments.batch_id, "Id of the batch, as status lists it")->required();
-    add_reason(command, arguments);
+    add_decision(command, arguments);
   };
   commands.add("release", "Let later trainings take a batch that is in quarantine", release, add_batch);
   commands.add("discard", "Let nothing take a batch any more", discard, add_batch);

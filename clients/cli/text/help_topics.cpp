@@ -143,7 +143,7 @@ constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
      "  trammel batches --cell cell-7\n"
      "  trammel batches --cell cell-7 --batch b1 -o b1.csv"},
     {"activate", "  trammel activate --model cell-7@3 --reason \"checked on 12 poses\""},
-    {"rollback", "  trammel rollback --cell cell-7 --reason \"drill jig was loose\""},
+    {"rollback", "  trammel rollback --cell cell-7 --expected 3 --reason \"drill jig was loose\""},
     {"release", "  trammel release --cell cell-7 --batch b2"},
     {"discard", "  trammel discard --cell cell-7 --batch b2"},
     {"export", "  trammel export --model cell-7 -o cell-7.model"},

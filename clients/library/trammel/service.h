@@ -122,8 +122,9 @@ class TRAMMEL_API Session {
                                      std::optional<int> expected_version = {}, bool force = false) const;
   /// Adds a model file's text to the history of its cell; activate() puts it in force. Returns its version.
   [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text) const;
-  /// Puts the version before in force again, and returns it.
-  [[nodiscard]] Result<int> roll_back(const std::string& cell, const std::string& reason = {}) const;
+  /// Puts the version before in force again, and returns it; refused where `expected_version` is not in force.
+  [[nodiscard]] Result<int> roll_back(const std::string& cell, const std::string& reason = {},
+                                      std::optional<int> expected_version = {}) const;
 
  private:
   struct Inside;

@@ -511,6 +511,6 @@ class Session:
         the version in force, or cannot be judged, unless `force` is true."""
         return self._inside.activate(cell, version, reason, expected_version, force)
 
-    def roll_back(self, cell: str, reason: str = "") -> int:
-        """Puts the version before in force again, and returns it."""
-        return self._inside.roll_back(cell, reason)
+    def roll_back(self, cell: str, reason: str = "", expected_version: Optional[int] = None) -> int:
+        """Puts the version before in force again, and returns it; `Conflict` where another than `expected_version` is."""
+        return self._inside.roll_back(cell, reason, expected_version)
