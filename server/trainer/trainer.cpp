@@ -494,9 +494,8 @@ Status Trainer::check_not_worse(const std::string& cell, int version, const Gate
   if (!made_here) return tl::make_unexpected(made_here.error());
   // The job that made it has said already that it could not be judged: whoever asks for it knows. What few judges find
   // worse by far is so all the same.
-  constexpr double kByFar = 1.5;
-  const bool is_far_worse = has_figures && *figures.after > kByFar * *figures.before;
-  if (*made_here && !is_far_worse && (verdict.undecided || !has_figures)) return {};
+  const bool far_worse = has_figures && is_far_worse(*figures.before, *figures.after);
+  if (*made_here && !far_worse && (verdict.undecided || !has_figures)) return {};
   const char* how = has_figures ? "worse than" : "not known to be as good as";
   Failure worse =
       refused("cell {}: version {} is {} version {}, which is in force: {}", cell, version, how,

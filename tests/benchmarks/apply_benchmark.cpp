@@ -137,15 +137,16 @@ void run(const std::string& kind, int seed, const Settings& settings, Figures& f
   const double before = rms_of(extension->before, fresh);
   const double after = rms_of(extension->after, fresh);
   std::printf("%-22s %3d  %5.1f s  %-9s fresh %.4f -> %.4f mm (%+.0f %%)  random rows %+.0f %%  %s  [%s]%s\n",
-              kind.c_str(), seed, seconds, extension->worthwhile() ? "applied" : "not", to_mm(before), to_mm(after),
-              100 * (1 - after / before), 100 * (1 - extension->gain.rms_after / extension->gain.rms_before),
+              kind.c_str(), seed, seconds, extension->why_not().empty() ? "applied" : "not", to_mm(before),
+              to_mm(after), 100 * (1 - after / before),
+              100 * (1 - extension->gain.rms_after / extension->gain.rms_before),
               extension->day ? fmt::format("another day {:+.0f} % [{:+.0f}, {:+.0f}]", 100 * extension->day->share,
                                            100 * extension->day->lower, 100 * extension->day->upper)
                                    .c_str()
                              : "no day",
               fmt::format("{}", fmt::join(extension->sources, " ")).c_str(), after > 1.02 * before ? "  WORSE" : "");
   std::fflush(stdout);
-  if (extension->worthwhile()) judge(*extension, before, after, figures);
+  if (extension->why_not().empty()) judge(*extension, before, after, figures);
 }
 
 std::vector<std::string> kinds_of(const Settings& settings) {

@@ -137,6 +137,26 @@ TEST_F(Extend, IsJudgedByAllPosesWhereMoreThanATenthFitNeitherModel) {
   EXPECT_EQ(judges_of(diagnosis_, rows).left_out.size(), 2U) << "one that was learned from is not held out";
 }
 
+TEST_F(Extend, IsJudgedAsAServiceJudgesAndNeverByFewerThanThirtyPoses) {
+  diagnosis_.sources_after = {"base", kGear};
+  int held_out = 0;
+  for (Measurement& m : batch_.measurements) {
+    if (m.set == MeasurementSet::kValidation && ++held_out > 20) m.set = MeasurementSet::kTrain;
+  }
+  const Extension extension = test::demand(extend(cell_, batch_, diagnosis_, {}));
+  EXPECT_TRUE(extension.gain.beyond_chance()) << to_string(extension.gain);
+  EXPECT_NE(extension.why_not().find("20 poses are held out to judge by in the joint ranges of the model without what "
+                                     "was found, 30 are needed"),
+            std::string::npos)
+      << extension.why_not();
+}
+
+TEST_F(Extend, FilesHoldOutWhatAServiceDrawsWhereTheBatchDoesNotSay) {
+  for (Measurement& m : batch_.measurements) m.set = MeasurementSet::kUnassigned;
+  const CheckedBatch drawn = test::demand(check_against_cell(batch_, *cell_, held_out_to_extend(1)));
+  EXPECT_EQ(drawn.held_out().measurements.size(), 34U);
+}
+
 TEST_F(Extend, BeginsWithTheNominalModelWhereTheCellListsNoSources) {
   Cell nominal = *cell_;
   nominal.model.error_sources.clear();
@@ -151,7 +171,7 @@ TEST_F(Extend, SaysWhatATrueCauseIsWorthOnAnotherDayWithAnInterval) {
   diagnosis_.sources_after = {"base", kGear};
   const Extension extension = test::demand(extend(cell_, batch_, diagnosis_, {}));
   ASSERT_TRUE(extension.day);
-  EXPECT_TRUE(extension.worthwhile());
+  EXPECT_EQ(extension.why_not(), "");
   EXPECT_EQ(extension.day->blocks, 5);
   EXPECT_EQ(extension.day->gain.poses, 120);
   const double by_random_rows = 1 - extension.gain.rms_after / extension.gain.rms_before;
@@ -189,12 +209,10 @@ TEST_F(Extend, IsNotWorthwhileWhereOnlyThisBatchGains) {
   diagnosis_.sources_after = {"base", kGear, "thermal_growth"};
   const auto cell = std::make_shared<const Cell>(known);
   Extension extension = test::demand(extend(cell, drifting_as_it_warms(batch_), diagnosis_, {}));
-  extension.gain.z_sum = 5;  // as rows drawn at random may say
-  extension.gain.rms_after = 0.9 * extension.gain.rms_before;
-  EXPECT_TRUE(extension.gain.beyond_chance());
+  extension.verdict.put_in_force = true;  // as rows drawn at random may say
   ASSERT_TRUE(extension.day);
   EXPECT_FALSE(extension.day->carries()) << to_string(*extension.day);
-  EXPECT_FALSE(extension.worthwhile());
+  EXPECT_EQ(extension.why_not(), to_string(*extension.day));
 }
 
 TEST_F(Extend, WhatTheInstrumentDidIsNoGainOfAnotherDay) {

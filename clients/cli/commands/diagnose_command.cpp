@@ -23,8 +23,6 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr const char* kCellOption = "--cell-out";
-constexpr double kHeldOutShare =
-    0.2;  // share of the rows held out to judge an extended model, if the batch has no `set` column
 
 Result<Diagnosis> run_diagnosis(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                 std::uint64_t seed) {
@@ -78,12 +76,7 @@ struct Applied {
   std::string why_not = {};
 };
 
-std::string why_not_worthwhile(const Extension& extension) {
-  return extension.gain.beyond_chance() ? to_string(*extension.day) : to_string(extension.gain);
-}
-
-/// Extends the model by the causes found. Writes it only if the error on held-out poses falls by more than chance, and
-/// does not rise on blocks of time held out.
+/// Extends the model by the causes found. Writes it only where a service would put it in force.
 Result<Applied> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch, const Diagnosis& diagnosis,
                       const DiagnoseArguments& arguments, ordered_json& json, Outputs& outputs) {
   if (const Status possible = check_can_extend(diagnosis); !possible) return Applied{{}, sentence(possible.error())};
@@ -91,9 +84,8 @@ Result<Applied> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatc
   if (!extension) return tl::make_unexpected(extension.error());
   json["applied"] = extension_json(*extension);
   say(extension_text(*extension), arguments);
-  if (!extension->worthwhile()) {
-    return Applied{{}, fmt::format("cell {}: with what was found {}", cell->name, why_not_worthwhile(*extension))};
-  }
+  if (const std::string why_not = extension->why_not(); !why_not.empty())
+    return Applied{{}, fmt::format("cell {}: {}", cell->name, why_not)};
   Result<std::string> text = with_error_sources(cell->cell_yaml, extension->lasting, arguments.cell);
   if (!text) return tl::make_unexpected(text.error());
   outputs.put(kCellOption, std::move(*text));
@@ -103,7 +95,8 @@ Result<Applied> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatc
 
 /// The batch to diagnose. With --apply some rows are held out, to judge the extended model.
 Result<CheckedBatch> batch_to_diagnose(const DiagnoseArguments& arguments, const Cell& cell) {
-  return read_checked_batches(arguments.batches, cell, drawn(arguments.apply ? kHeldOutShare : 0, arguments.seed));
+  return read_checked_batches(arguments.batches, cell,
+                              arguments.apply ? held_out_to_extend(arguments.seed) : drawn(0, arguments.seed));
 }
 
 /// Says what was applied, or why nothing was.

@@ -296,7 +296,7 @@ ordered_json another_day_json(const std::optional<DayGain>& day) {
 ordered_json extension_json(const Extension& extension) {
   ordered_json left_out = ordered_json::array();
   for (const Unsupported& one : extension.left_out) left_out.push_back({{"source", one.source}, {"z", one.z}});
-  return {{"better", extension.worthwhile()},
+  return {{"better", extension.why_not().empty()},
           {"z", extension.gain.z()},
           {"z_limit", PairedGain::kBeyondChance},
           {"judged_without", extension.gain.left_out},

@@ -79,11 +79,10 @@ bool not_worse(const PairedGain& gain, double accept_ratio) {
 /// Of orientations, beside positions that gain: beyond chance, or by half. What is left of a turn is never held to be
 /// less than the instrument's own `sigma` an axis.
 bool clearly_worse(const PairedGain& turns, double accept_ratio, double sigma) {
-  constexpr double kByFar = 1.5;
   if (turns.poses == 0) return false;
   const double before = std::max(turns.rms_before, std::sqrt(3.0) * sigma);
   const bool beyond_chance = std::min(turns.z_ranks, turns.z_sum) < -PairedGain::kBeyondChance;
-  return turns.rms_after > kByFar * before || (beyond_chance && turns.rms_after > accept_ratio * before);
+  return is_far_worse(before, turns.rms_after) || (beyond_chance && turns.rms_after > accept_ratio * before);
 }
 
 /// How many different poses these rows are.
@@ -97,6 +96,11 @@ int distinct(const std::vector<const Measurement*>& judges, const Columns& among
     if (!known) poses.push_back(q);
   }
   return static_cast<int>(poses.size());
+}
+
+/// `version 3`; without a number it is what a candidate would add to.
+std::string name_of(const ServedModel& model) {
+  return model.version > 0 ? fmt::format("version {}", model.version) : "the model without what was found";
 }
 
 constexpr const char* kAdvice = "activate it if it is wanted";
@@ -145,10 +149,10 @@ class Duel {
 
   [[nodiscard]] GateVerdict verdict() const {
     if (const std::string lost = lost_tools(); !lost.empty())
-      return stays(fmt::format("it does not know {}, which version {} knows", lost, present_.version));
+      return stays(fmt::format("it does not know {}, which {} knows", lost, name_of(present_)));
     if (const double covered = covered_by_candidate(); covered < GateOptions::kLeastCoverage)
-      return stays(fmt::format("it was trained on {:.0f} % of the joint ranges of version {}, limit {:.0f} %",
-                               100 * covered, present_.version, 100 * GateOptions::kLeastCoverage));
+      return stays(fmt::format("it was trained on {:.0f} % of the joint ranges of {}, limit {:.0f} %", 100 * covered,
+                               name_of(present_), 100 * GateOptions::kLeastCoverage));
     if (!shared_.empty() && apart() < GateOptions::kSame) return of_the_same();
     if (const std::string few = too_few(); !few.empty()) {
       GateVerdict undecided = stays(few, without_limit(figures_of(shared_gain())));
@@ -166,8 +170,7 @@ class Duel {
     return ((q - parts.q_min + margin).array() >= 0).all() && ((parts.q_max + margin - q).array() >= 0).all();
   }
   [[nodiscard]] GateVerdict stays(const std::string& why, const GateFigures& figures = {}) const {
-    return no(why, figures,
-              fmt::format("version {} stays in force; activate the new one if it is wanted", present_.version));
+    return no(why, figures, fmt::format("{} stays in force; activate the new one if it is wanted", name_of(present_)));
   }
   [[nodiscard]] std::string lost_tools() const {
     std::string lost;
@@ -202,12 +205,12 @@ class Duel {
     if (poses >= GateOptions::kFewestJudges && covered >= GateOptions::kLeastCoverage) return "";
     if (poses >= GateOptions::kFewestJudges) {
       return fmt::format(
-          "the {} poses held out to judge by spread over {:.0f} % of the joint ranges of version {}, "
+          "the {} poses held out to judge by spread over {:.0f} % of the joint ranges of {}, "
           "limit {:.0f} %",
-          poses, 100 * covered, present_.version, 100 * GateOptions::kLeastCoverage);
+          poses, 100 * covered, name_of(present_), 100 * GateOptions::kLeastCoverage);
     }
-    return fmt::format("{} poses are held out to judge by in the joint ranges of version {}, {} are needed{}", poses,
-                       present_.version, GateOptions::kFewestJudges, figures());
+    return fmt::format("{} poses are held out to judge by in the joint ranges of {}, {} are needed{}", poses,
+                       name_of(present_), GateOptions::kFewestJudges, figures());
   }
   [[nodiscard]] PairedGain shared_gain() const { return gain_of(before_.position, after_.position, shared_); }
   [[nodiscard]] std::string figures() const {
@@ -220,14 +223,14 @@ class Duel {
   /// Of a candidate that predicts what the one in force does: it may know one tool more.
   [[nodiscard]] GateVerdict of_the_same() const {
     const std::string same =
-        fmt::format("it predicts what version {} predicts, within {:.4f} mm", present_.version, to_mm(apart()));
+        fmt::format("it predicts what {} predicts, within {:.4f} mm", name_of(present_), to_mm(apart()));
     if (new_tools_.empty()) return of_the_base(same);
     const PairedGain gain =
         gain_of(rows_of(candidate_, sessions_, JudgedLevel::kNominal).position, after_.position, new_tools_);
     const std::string text = fmt::format(
-        "{}, and of the tools that version {} does not know: held-out rms {:.4f} mm, "
+        "{}, and of the tools that {} does not know: held-out rms {:.4f} mm, "
         "nominal {:.4f} mm, {} poses",
-        same, present_.version, to_mm(gain.rms_after), to_mm(gain.rms_before), gain.poses);
+        same, name_of(present_), to_mm(gain.rms_after), to_mm(gain.rms_before), gain.poses);
     const double limit = options_.accept_ratio * gain.rms_before;
     const GateFigures figures = with_limit(figures_of(gain), limit);
     return gain.rms_after > limit ? stays(text, figures) : yes(text, figures);
@@ -271,9 +274,8 @@ class Duel {
     } else if (kept && turns.beyond_chance()) {
       why = fmt::format("not worse, and its orientations are better beyond chance ({})", in_words(turns));
     }
-    const std::string text =
-        fmt::format("held-out rms {:.4f} mm before (version {}), {:.4f} mm after, on the same {} poses",
-                    to_mm(gain.rms_before), present_.version, to_mm(gain.rms_after), gain.poses);
+    const std::string text = fmt::format("held-out rms {:.4f} mm before ({}), {:.4f} mm after, on the same {} poses",
+                                         to_mm(gain.rms_before), name_of(present_), to_mm(gain.rms_after), gain.poses);
     GateFigures figures = figures_of(gain);
     if (why.empty()) {
       return stays(fmt::format("{}: not better beyond chance (z {:.2f}, limit {:.2f})", text, gain.z(),
@@ -297,7 +299,7 @@ class Duel {
       const PairedGain gain = gain_of(rows_of(other.model, sessions_).position, after_.position, inside_);
       if (gain.poses > 0 && gain.rms_after > options_.accept_ratio * gain.rms_before) {
         figures.limit = options_.accept_ratio * gain.rms_before;
-        return fmt::format("version {} has {:.4f} mm on them, limit {} x that", other.version, to_mm(gain.rms_before),
+        return fmt::format("{} has {:.4f} mm on them, limit {} x that", name_of(other), to_mm(gain.rms_before),
                            options_.accept_ratio);
       }
     }

@@ -38,7 +38,8 @@ struct GateOptions {
 
 struct GateQuestion {
   const CompensatedModel& candidate;
-  const ServedModel* in_force = nullptr;   ///< none: the first model of its cell
+  /// None: the candidate is the first model of its cell. Version 0: the model that the candidate extends.
+  const ServedModel* in_force = nullptr;
   std::vector<ServedModel> served_before;  ///< the candidate must not be worse than any of them either
   std::vector<JudgingSession> sessions;    ///< oldest first
   std::size_t first_new = 0;               ///< from this one on they came after the model in force was trained
@@ -58,6 +59,9 @@ struct GateVerdict {
   std::string why = {};    ///< of the message: the reason alone
   GateFigures figures = {};
 };
+
+/// What no chance explains, however few the judges are: half as much again (rms of the same poses).
+[[nodiscard]] constexpr bool is_far_worse(double before, double after) { return after > 1.5 * before; }
 
 [[nodiscard]] GateVerdict judge(const GateQuestion& question, const GateOptions& options);
 

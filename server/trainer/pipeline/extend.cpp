@@ -4,6 +4,8 @@
 #include <set>
 
 #include "server/error_sources/catalogue.h"
+#include "server/trainer/acceptance/judging.h"
+#include "server/trainer/acceptance/verdict.h"
 #include "server/trainer/pipeline/lasting_sources.h"
 
 namespace trammel {
@@ -143,9 +145,27 @@ Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const CheckedB
   Judges judges = judges_of(diagnosis, batch.held_out());
   PairedGain gain = paired_gain(*before, after->model, judges.batch);
   gain.left_out = std::move(judges.left_out);
+  const ServedModel present(cell->name, 0, *before);
+  GateVerdict verdict =
+      verdict_on(after->model, &present, {}, std::nullopt, {{batch.id(), batch.training(), std::move(judges.batch)}},
+                 {.bar = Bar::kBetterBeyondChance});
   std::vector<std::string> lasting = lasting_sources(after->sources);
-  return Extension{std::move(after->sources),  std::move(lasting),   std::move(*before), std::move(after->model), gain,
-                   std::move(after->left_out), std::move(after->day)};
+  return Extension{std::move(after->sources), std::move(lasting), std::move(*before),         std::move(after->model),
+                   std::move(gain),           std::move(verdict), std::move(after->left_out), std::move(after->day)};
+}
+
+std::string Extension::why_not() const {
+  if (day && !day->carries()) return to_string(*day);
+  return verdict.put_in_force ? "" : verdict.why;
+}
+
+HoldOut held_out_to_extend(std::uint64_t seed) {
+  constexpr double kShare = 0.2;
+  return [seed](const MeasurementBatch& batch) {
+    const bool says = std::any_of(batch.measurements.begin(), batch.measurements.end(),
+                                  [](const Measurement& m) { return m.set != MeasurementSet::kUnassigned; });
+    return says ? drawn(kShare, seed)(batch) : held_out_by_service(kShare, seed)(batch);
+  };
 }
 
 Error with_rows_set_aside(Error error, const CheckedBatch& batch) {

@@ -8,6 +8,7 @@
 
 #include "server/compensate/paired_gain.h"
 #include "server/diagnose/diagnosis.h"
+#include "server/trainer/acceptance/gate.h"
 #include "server/trainer/pipeline/another_day.h"
 #include "server/trainer/pipeline/supported.h"
 #include "server/trainer/pipeline/train.h"
@@ -50,12 +51,16 @@ struct Extension {
   std::vector<std::string> lasting;   ///< of them, those that belong into the cell file
   CompensatedModel before, after;     ///< both with figures on the same poses held out
   PairedGain gain;                    ///< of the one over the other
+  GateVerdict verdict;                ///< on the extended model, as a service judges it
   std::vector<Unsupported> left_out;  ///< found, but the poses held out do as well without
   std::optional<DayGain> day;         ///< what the causes are worth on another day; empty: too few rows to tell
 
-  /// Better beyond chance on the rows held out, and no worse where blocks of time were.
-  [[nodiscard]] bool worthwhile() const { return gain.beyond_chance() && (!day || day->carries()); }
+  /// Why it is not to be applied: it would not go in force by itself, or is worse where blocks of time were held out.
+  /// Empty: apply it.
+  [[nodiscard]] std::string why_not() const;
 };
+/// Holds out the rows with `set` where the batch has them; else what a service draws to judge by, a fifth.
+[[nodiscard]] HoldOut held_out_to_extend(std::uint64_t seed);
 /// extended_model() of the cell's own sources, beside a model of them alone. Refusals as there.
 [[nodiscard]] Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                        const Diagnosis& diagnosis, const TrainOptions& options);
