@@ -10,8 +10,8 @@
 #include "server/base/units.h"
 #include "server/bias/flange/flange_views.h"
 #include "server/bias/kernels/kernel_spelling.h"
-#include "server/bias/pose_groups.h"
 #include "server/bias/process/halves.h"
+#include "server/measurement/pose_groups.h"
 
 namespace trammel {
 namespace {

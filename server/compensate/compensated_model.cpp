@@ -312,7 +312,8 @@ Evaluation CompensatedModel::evaluate_positions(const MeasurementBatch& batch) c
       coverage_95(errors.compensated, stated_sigmas(batch, cell()).transpose().replicate<3, 1>());
   evaluation.in_domain = static_cast<int>(std::count(errors.in_domain.begin(), errors.in_domain.end(), true));
   evaluation.nlpd = negative_log_density(errors.compensated, errors.stddev);
-  if (inside_->bias) evaluation.bias_gain_z = paired_gain(errors.calibrated, errors.compensated).z();
+  if (inside_->bias)
+    evaluation.bias_gain_z = paired_gain(errors.calibrated, errors.compensated, pose_groups(batch)).z();
   const LevelErrors::Rotations& rotation = errors.rotation;
   if (rotation.nominal.cols() > 0) {
     const auto rms = [](const Eigen::Matrix3Xd& turns) {
@@ -327,7 +328,7 @@ Evaluation CompensatedModel::evaluate_positions(const MeasurementBatch& batch) c
 }
 
 PairedGain paired_gain(const CompensatedModel& before, const CompensatedModel& after, const MeasurementBatch& batch) {
-  return paired_gain(before.errors_B(batch).compensated, after.errors_B(batch).compensated);
+  return paired_gain(before.errors_B(batch).compensated, after.errors_B(batch).compensated, pose_groups(batch));
 }
 
 }  // namespace trammel

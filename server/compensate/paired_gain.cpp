@@ -43,16 +43,26 @@ std::string verdict(const PairedGain& gain) {
 
 }  // namespace
 
-PairedGain paired_gain(const Eigen::Matrix3Xd& before, const Eigen::Matrix3Xd& after) {
+PairedGain paired_gain(const Eigen::Matrix3Xd& before, const Eigen::Matrix3Xd& after,
+                       const std::vector<PoseGroup>& poses) {
   const Eigen::VectorXd square_before = before.colwise().squaredNorm();
   const Eigen::VectorXd square_after = after.colwise().squaredNorm();
+  Eigen::VectorXd less(std::ssize(poses));
+  for (std::size_t p = 0; p < poses.size(); ++p)
+    less(static_cast<Eigen::Index>(p)) = (square_before - square_after)(poses[p]).sum();
   PairedGain gain;
-  gain.poses = static_cast<int>(before.cols());
+  gain.poses = static_cast<int>(poses.size());
   gain.rms_before = std::sqrt(square_before.mean());
   gain.rms_after = std::sqrt(square_after.mean());
-  gain.z_ranks = signed_rank_z(square_before - square_after);
-  gain.z_sum = sum_z(square_before - square_after);
+  gain.z_ranks = signed_rank_z(less);
+  gain.z_sum = sum_z(less);
   return gain;
+}
+
+PairedGain paired_gain(const Eigen::Matrix3Xd& before, const Eigen::Matrix3Xd& after) {
+  std::vector<PoseGroup> poses;
+  for (Eigen::Index i = 0; i < before.cols(); ++i) poses.push_back({i});
+  return paired_gain(before, after, poses);
 }
 
 std::string to_string(const PairedGain& gain) {

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "server/base/units.h"
-#include "server/bias/pose_groups.h"
+#include "server/measurement/pose_groups.h"
 #include "server/robot/cell_papers.h"
 
 namespace trammel {
@@ -50,10 +50,7 @@ std::optional<double> reach_of(const Eigen::Matrix3Xd& places) {
 
 /// One row of each joint vector, evenly chosen where there are too many.
 std::vector<Eigen::Index> rows_to_keep(const MeasurementBatch& batch) {
-  const auto n = static_cast<Eigen::Index>(batch.measurements.size());
-  Eigen::MatrixXd q(n, batch.measurements.front().context.q.size());
-  for (Eigen::Index i = 0; i < n; ++i) q.row(i) = batch.measurements[static_cast<std::size_t>(i)].context.q.transpose();
-  const std::vector<PoseGroup> groups = pose_groups(q);
+  const std::vector<PoseGroup> groups = pose_groups(batch);
   const std::size_t step = groups.size() / static_cast<std::size_t>(kPlaces) + 1;
   std::vector<Eigen::Index> rows;
   for (std::size_t g = 0; g < groups.size(); g += step) rows.push_back(groups[g].front());

@@ -13,7 +13,7 @@ namespace trammel {
 
 /// Chooses the rows that are held out: one flag per row. The batch still has `set` as it was recorded.
 using HoldOut = std::function<std::vector<bool>(const MeasurementBatch& batch)>;
-/// Chooses by the `set` column if the batch has one, else draws `share` of the rows at random with `seed`.
+/// Chooses by the `set` column if the batch has one, else draws `share` of the poses at random with `seed`.
 [[nodiscard]] HoldOut drawn(double share, std::uint64_t seed);
 
 /// A batch that was checked against a cell and split into training and held-out rows. All training and validation code

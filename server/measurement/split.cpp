@@ -6,14 +6,14 @@
 #include <random>
 
 #include "server/base/check.h"
+#include "server/measurement/pose_groups.h"
 
 namespace trammel {
 
 namespace {
 
-/// Draws `count` of `size` rows without replacement. Own Fisher-Yates: the result of std::shuffle differs between
-/// libraries.
-std::vector<bool> draw_rows(std::size_t size, std::size_t count, std::uint64_t seed) {
+/// Draws `count` of `size` without replacement. Own Fisher-Yates: the result of std::shuffle differs between libraries.
+std::vector<bool> draw(std::size_t size, std::size_t count, std::uint64_t seed) {
   std::vector<std::size_t> order(size);
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::mt19937_64 random(seed);
@@ -27,6 +27,12 @@ std::vector<bool> draw_rows(std::size_t size, std::size_t count, std::uint64_t s
 
 }  // namespace
 
+std::vector<bool> drawn_of(std::size_t count, double share, std::uint64_t seed) {
+  if (count == 0) return {};
+  const double wanted = std::round(std::clamp(share, 0.0, 1.0) * static_cast<double>(count));
+  return draw(count, std::min(static_cast<std::size_t>(wanted), count - 1), seed);
+}
+
 std::vector<bool> rows_held_out(const MeasurementBatch& batch, double share, std::uint64_t seed) {
   const auto& rows = batch.measurements;
   const bool assigned =
@@ -36,9 +42,12 @@ std::vector<bool> rows_held_out(const MeasurementBatch& batch, double share, std
     for (const Measurement& m : rows) validation.push_back(m.set == MeasurementSet::kValidation);
     return validation;
   }
-  if (rows.empty()) return {};
-  const double wanted = std::round(std::clamp(share, 0.0, 1.0) * static_cast<double>(rows.size()));
-  return draw_rows(rows.size(), std::min(static_cast<std::size_t>(wanted), rows.size() - 1), seed);
+  const std::vector<PoseGroup> poses = pose_groups(batch);
+  const std::vector<bool> drawn = drawn_of(poses.size(), share, seed);
+  std::vector<bool> held_out(rows.size());
+  for (std::size_t p = 0; p < poses.size(); ++p)
+    for (const Eigen::Index row : poses[p]) held_out[static_cast<std::size_t>(row)] = drawn[p];
+  return held_out;
 }
 
 BatchSplit split_rows(const MeasurementBatch& batch, const std::vector<bool>& held_out) {

@@ -105,6 +105,22 @@ TEST(PairedGain, DoesNotCountWhereMostPosesAreBetterAndTheOthersMuchWorse) {
   EXPECT_NE(to_string(gain).find("better at most poses, but much worse at others"), std::string::npos);
 }
 
+/// Three reflectors see one error of the arm: rows that agree are no three witnesses.
+TEST(PairedGain, CountsThePosesAndNotTheReflectorsThatSeeThem) {
+  constexpr Eigen::Index kPoses = 20;
+  int better = 0;
+  for (std::uint64_t seed = 0; seed < 400; ++seed) {
+    const Eigen::Matrix3Xd one = noise(kPoses, 1e-5, 2 * seed), other = noise(kPoses, 1e-5, 2 * seed + 1);
+    std::vector<PoseGroup> poses;
+    for (Eigen::Index i = 0; i < kPoses; ++i) poses.push_back({i, i + kPoses, i + 2 * kPoses});
+    const PairedGain gain = paired_gain(one.replicate<1, 3>(), other.replicate<1, 3>(), poses);
+    EXPECT_EQ(gain.poses, kPoses);
+    EXPECT_DOUBLE_EQ(gain.z(), paired_gain(one, other).z());
+    better += gain.beyond_chance() ? 1 : 0;
+  }
+  EXPECT_LE(better, 8) << "one in a hundred equally good models";
+}
+
 TEST(PairedGain, IsNoneWhereAnErrorIsNotFinite) {
   Eigen::Matrix3Xd before = noise(30, 1e-5, 5);
   const Eigen::Matrix3Xd after = 0.5 * before;

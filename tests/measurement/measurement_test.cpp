@@ -236,6 +236,14 @@ TEST(SplitBatch, LeavesARowForTraining) {
   EXPECT_EQ(split_batch(MeasurementBatch{}, 0.5, 1).train.measurements.size(), 0u);
 }
 
+TEST(SplitBatch, HoldsOutAllRowsOfAPoseTogether) {
+  MeasurementBatch batch = make_batch(make_cell(), 90, 1, kTool);
+  for (std::size_t i = 1; i < 90; ++i) batch.measurements[i].context.q = batch.measurements[i - i % 3].context.q;
+  const std::vector<bool> held_out = rows_held_out(batch, 0.2, 7);
+  for (std::size_t i = 0; i < 90; ++i) EXPECT_EQ(held_out[i], held_out[i - i % 3]) << i;
+  EXPECT_EQ(std::count(held_out.begin(), held_out.end(), true), 18) << "a fifth of 30 poses, three rows each";
+}
+
 /// When the newest of measurements of these times was taken, in a batch taken in at 1.7e9.
 std::int64_t newest_of(const std::vector<std::optional<double>>& times) {
   MeasurementBatch batch;

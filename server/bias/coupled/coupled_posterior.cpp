@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "server/base/check.h"
-#include "server/bias/pose_groups.h"
 #include "server/bias/process/inducing_points.h"
+#include "server/measurement/pose_groups.h"
 #include "server/numerics/numerics.h"
 #include "server/numerics/seeded_random.h"
 

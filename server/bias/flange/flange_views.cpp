@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/bias/pose_groups.h"
+#include "server/measurement/pose_groups.h"
 
 namespace trammel {
 namespace {

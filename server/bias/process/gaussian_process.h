@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "server/bias/kernels/kernel.h"
-#include "server/bias/pose_groups.h"
 #include "server/bias/process/near_points.h"
 #include "server/bias/process/variance_table.h"
+#include "server/measurement/pose_groups.h"
 #include "server/numerics/aligned_matrix.h"
 #include "server/numerics/bfgs.h"
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "server/bias/kernels/kernel.h"
-#include "server/bias/pose_groups.h"
+#include "server/measurement/pose_groups.h"
 
 namespace trammel {
 

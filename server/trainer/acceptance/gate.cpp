@@ -62,9 +62,14 @@ Columns both_finite(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b, const 
   return both;
 }
 
-PairedGain gain_of(const Eigen::Matrix3Xd& before, const Eigen::Matrix3Xd& after, const Columns& among) {
+/// `judges`: of all columns.
+PairedGain gain_of(const Eigen::Matrix3Xd& before, const Eigen::Matrix3Xd& after, const Columns& among,
+                   const std::vector<const Measurement*>& judges) {
   const Columns both = both_finite(before, after, among);
-  return both.empty() ? PairedGain{} : paired_gain(before(Eigen::all, both), after(Eigen::all, both));
+  if (both.empty()) return {};
+  std::vector<JointVector> q;
+  for (const Eigen::Index i : both) q.push_back(judges[static_cast<std::size_t>(i)]->context.q);
+  return paired_gain(before(Eigen::all, both), after(Eigen::all, both), pose_groups(q));
 }
 
 double rms(const Eigen::VectorXd& values, const Columns& among) {
@@ -212,7 +217,7 @@ class Duel {
     return fmt::format("{} poses are held out to judge by in the joint ranges of {}, {} are needed{}", poses,
                        name_of(present_), GateOptions::kFewestJudges, figures());
   }
-  [[nodiscard]] PairedGain shared_gain() const { return gain_of(before_.position, after_.position, shared_); }
+  [[nodiscard]] PairedGain shared_gain() const { return gain_of(before_.position, after_.position, shared_, judges_); }
   [[nodiscard]] std::string figures() const {
     const PairedGain gain = shared_gain();
     if (gain.poses == 0) return "";
@@ -226,7 +231,7 @@ class Duel {
         fmt::format("it predicts what {} predicts, within {:.4f} mm", name_of(present_), to_mm(apart()));
     if (new_tools_.empty()) return of_the_base(same);
     const PairedGain gain =
-        gain_of(rows_of(candidate_, sessions_, JudgedLevel::kNominal).position, after_.position, new_tools_);
+        gain_of(rows_of(candidate_, sessions_, JudgedLevel::kNominal).position, after_.position, new_tools_, judges_);
     const std::string text = fmt::format(
         "{}, and of the tools that {} does not know: held-out rms {:.4f} mm, "
         "nominal {:.4f} mm, {} poses",
@@ -257,9 +262,9 @@ class Duel {
   }
 
   [[nodiscard]] GateVerdict of_another() const {
-    const PairedGain gain = gain_of(before_.position, after_.position, inside_);
-    const PairedGain beyond = gain_of(before_.position, after_.position, outside_);
-    const PairedGain turns = gain_of(before_.rotation, after_.rotation, shared_);
+    const PairedGain gain = gain_of(before_.position, after_.position, inside_, judges_);
+    const PairedGain beyond = gain_of(before_.position, after_.position, outside_, judges_);
+    const PairedGain turns = gain_of(before_.rotation, after_.rotation, shared_, judges_);
     const bool kept = not_worse(gain, options_.accept_ratio);
     std::string why;
     if (gain.beyond_chance()) {
@@ -296,7 +301,7 @@ class Duel {
   /// that it is.
   [[nodiscard]] std::string better_before(GateFigures& figures) const {
     for (const ServedModel& other : served_before_) {
-      const PairedGain gain = gain_of(rows_of(other.model, sessions_).position, after_.position, inside_);
+      const PairedGain gain = gain_of(rows_of(other.model, sessions_).position, after_.position, inside_, judges_);
       if (gain.poses > 0 && gain.rms_after > options_.accept_ratio * gain.rms_before) {
         figures.limit = options_.accept_ratio * gain.rms_before;
         return fmt::format("{} has {:.4f} mm on them, limit {} x that", name_of(other), to_mm(gain.rms_before),
@@ -340,13 +345,14 @@ GateVerdict judge_first(const GateQuestion& question, const GateOptions& options
   const MeasurementBatch all = judges_in_world(question);
   if (all.measurements.empty()) return no("no pose that was held out has its tools", {}, kAdvice);
   const CompensatedModel::LevelErrors errors = question.candidate.errors_B(all);
-  const PairedGain gain = paired_gain(errors.nominal, errors.compensated);
+  const PairedGain gain = paired_gain(errors.nominal, errors.compensated, pose_groups(all));
   const Rows nominal = rows_of(question.candidate, question.sessions, JudgedLevel::kNominal);
   const Rows compensated = rows_of(question.candidate, question.sessions);
+  const std::vector<const Measurement*> judges = judges_in(question.sessions);
   Columns columns;
   for (Eigen::Index i = 0; i < nominal.position.cols(); ++i) columns.push_back(i);
-  const PairedGain arm = gain_of(nominal.position, compensated.position, columns);
-  const PairedGain turns = gain_of(nominal.rotation, compensated.rotation, columns);
+  const PairedGain arm = gain_of(nominal.position, compensated.position, columns, judges);
+  const PairedGain turns = gain_of(nominal.rotation, compensated.rotation, columns, judges);
   const bool better = options.bar == Bar::kBetterBeyondChance ? gain.beyond_chance() : gain.rms_after < gain.rms_before;
   const std::string text = fmt::format("held-out rms {:.4f} mm, nominal {:.4f} mm, {} poses", to_mm(gain.rms_after),
                                        to_mm(gain.rms_before), gain.poses);

@@ -66,10 +66,8 @@ std::vector<Indices> drawn_poses(const MeasurementBatch& batch, double share, st
                        [&](std::size_t i) { return batch.measurements[i].set == MeasurementSet::kValidation; });
   });
   if (poses.size() < kFewestToDrawFrom) return {};
-  MeasurementBatch drawn_from;
-  drawn_from.measurements.resize(poses.size());
   const double wanted = judges_of(poses.size(), share) / static_cast<double>(poses.size());
-  const std::vector<bool> is_drawn = rows_held_out(drawn_from, wanted, seed);
+  const std::vector<bool> is_drawn = drawn_of(poses.size(), wanted, seed);
   std::vector<Indices> drawn;
   for (std::size_t k = 0; k < poses.size(); ++k) {
     if (is_drawn[k]) drawn.push_back(std::move(poses[k]));

@@ -58,6 +58,7 @@ bool has_unknown_tools(const CompensatedModel& model, const MeasurementBatch& ba
 bool is_better_on(const std::vector<JudgingSession>& sessions, const CompensatedModel& before,
                   const CompensatedModel& after) {
   std::vector<Vector3> errors_before, errors_after;
+  std::vector<JointVector> q;
   for (const JudgingSession& session : sessions) {
     const Eigen::Matrix3Xd one = located_errors(before, session).position;
     const Eigen::Matrix3Xd other = located_errors(after, session).position;
@@ -65,12 +66,13 @@ bool is_better_on(const std::vector<JudgingSession>& sessions, const Compensated
       if (!one.col(i).allFinite() || !other.col(i).allFinite()) continue;
       errors_before.emplace_back(one.col(i));
       errors_after.emplace_back(other.col(i));
+      q.push_back(session.judges.measurements[static_cast<std::size_t>(i)].context.q);
     }
   }
   const auto n = static_cast<Eigen::Index>(errors_before.size());
   if (n == 0) return false;
   return paired_gain(Eigen::Map<const Eigen::Matrix3Xd>(errors_before.front().data(), 3, n),
-                     Eigen::Map<const Eigen::Matrix3Xd>(errors_after.front().data(), 3, n))
+                     Eigen::Map<const Eigen::Matrix3Xd>(errors_after.front().data(), 3, n), pose_groups(q))
       .beyond_chance();
 }
 

@@ -1,4 +1,4 @@
-#include "server/bias/pose_groups.h"
+#include "server/measurement/pose_groups.h"
 
 #include <cmath>
 #include <map>
@@ -23,6 +23,19 @@ std::vector<PoseGroup> pose_groups(const Eigen::MatrixXd& q) {
     groups[at->second].push_back(i);
   }
   return groups;
+}
+
+std::vector<PoseGroup> pose_groups(const std::vector<JointVector>& q) {
+  if (q.empty()) return {};
+  Eigen::MatrixXd rows(std::ssize(q), q.front().size());
+  for (Index i = 0; i < rows.rows(); ++i) rows.row(i) = q[static_cast<std::size_t>(i)].transpose();
+  return pose_groups(rows);
+}
+
+std::vector<PoseGroup> pose_groups(const MeasurementBatch& batch) {
+  std::vector<JointVector> q;
+  for (const Measurement& m : batch.measurements) q.push_back(m.context.q);
+  return pose_groups(q);
 }
 
 }  // namespace trammel

@@ -3,6 +3,8 @@
 #include <Eigen/Dense>
 #include <vector>
 
+#include "server/measurement/measurement.h"
+
 namespace trammel {
 
 /// Rows (rising) that stand at one joint vector.
@@ -12,5 +14,7 @@ using PoseGroup = std::vector<Eigen::Index>;
 /// that round to the same 1e-6: several reflectors of one pose, and repeats. Such rows share the error of the arm, so
 /// they are left out, held out and counted together.
 [[nodiscard]] std::vector<PoseGroup> pose_groups(const Eigen::MatrixXd& q);
+[[nodiscard]] std::vector<PoseGroup> pose_groups(const std::vector<JointVector>& q);
+[[nodiscard]] std::vector<PoseGroup> pose_groups(const MeasurementBatch& batch);
 
 }  // namespace trammel
