@@ -421,7 +421,7 @@ TEST(ModelFile, WhoseCausesOfACoupledJointFollowedTheCommandedAngleIsToBeTrained
     EXPECT_EQ(refusal_with(coupled(source, as_before)), Refusal("cell.model", {}, "angles").text(source));
     EXPECT_EQ(refusal_with(coupled(source, [](json&) {})), Refusal::none()) << source;
   }
-  for (const char* source : {"base", "geometry", "tool", "backlash:5", "link_bending:2"})
+  for (const char* source : {"base", "geometry", "tool", "backlash:5"})
     EXPECT_EQ(refusal_with(coupled(source, as_before)), Refusal::none()) << source;
 }
 
