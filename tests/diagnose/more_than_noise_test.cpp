@@ -5,6 +5,7 @@
 #include <random>
 
 #include "server/diagnose/diagnose.h"
+#include "server/robot/arm_state.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 
@@ -94,6 +95,38 @@ TEST(MoreThanNoise, OrientationsInXyzwOrderAreRefused) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().field, "qw,qx,qy,qz");
   EXPECT_EQ(refused.error().text, "as xyzw") << sentence(refused.error());
+}
+
+/// cell-7's virtual robot with play in joint 3 that grows with the torque on it more than the gear gives way, every
+/// pose approached from below or from either side.
+Diagnosis with_loaded_play(bool both_sides) {
+  const auto cell = test::cell_7();
+  VirtualRobot robot = test::chapter_5_robot(cell);
+  MeasurementBatch batch = test::measured(robot, 120, 21);
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
+    Measurement& m = batch.measurements[i];
+    const int side = both_sides && i % 2 == 0 ? -1 : 1;
+    m.context.direction.assign(6, side);
+    ArmState arm = robot.truth.state(m.context);
+    const Pose still = ArmKinematics(arm).tool_pose_W();
+    arm.add_to_joint(2, -side * (5e-5 + 3e-9 * std::abs(ArmKinematics(arm).gravity_torque()(2))));
+    const Pose moved = ArmKinematics(arm).tool_pose_W() * still.inverse();
+    m.p_W = moved * m.p_W;
+    m.R_WT = moved.linear() * *m.R_WT;
+  }
+  return diagnosed(batch);
+}
+
+TEST(MoreThanNoise, AGearThatWouldHaveToLiftItsLoadIsUnknownAndMayBePlay) {
+  const Diagnosis one_side = with_loaded_play(false);
+  EXPECT_EQ(one_side.verdict, Verdict::kUnknown) << one_side.sentence;
+  for (const Finding& finding : one_side.findings) EXPECT_FALSE(finding.could_also_be.empty()) << one_side.sentence;
+  EXPECT_GT(one_side.unexplained.rms, 0.5 * one_side.after.rms) << one_side.sentence;
+  EXPECT_NE(one_side.sentence.find("approach the poses from both sides"), std::string::npos) << one_side.sentence;
+  const Diagnosis both = with_loaded_play(true);
+  ASSERT_EQ(both.findings.size(), 1U) << both.sentence;
+  EXPECT_EQ(both.findings.front().cause.cause, "backlash") << both.sentence;
+  EXPECT_FALSE(both.unexplained.present) << both.sentence;
 }
 
 }  // namespace

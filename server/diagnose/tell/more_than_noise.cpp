@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "server/base/units.h"
+#include "server/diagnose/evidence/bounds.h"
+#include "server/diagnose/families/candidates.h"
 #include "server/diagnose/tell/between_sessions.h"
 #include "server/diagnose/tell/wording.h"
 #include "server/diagnose/thresholds.h"
@@ -11,6 +14,8 @@
 namespace trammel::cause_search {
 
 namespace {
+
+constexpr double kCut = 3;  // standard deviations, beyond which the size of a row no longer counts
 
 double ratio_of(const LeftOver& left) { return left.freedom > 0 ? left.left / left.stated : 1; }
 
@@ -23,6 +28,36 @@ double deviations(const LeftOver& left) {
 }
 
 LeftOver left_of(const LinearProblem::Spread& spread) { return {spread.noise, spread.stated, spread.freedom}; }
+
+/// What the model leaves in position with its numbers within their bounds. A spread is what no number explains wherever
+/// it would have to stand: a gearbox that lifts its load explains away what then is left.
+LeftOver left_within_bounds(const LinearProblem& served) {
+  LeftOver left = left_of(served.position_spread());
+  double square = 0;
+  for (Eigen::Index i = 0; i < served.poses(); ++i)
+    square += served.residual().segment<3>(served.first_row(i)).cwiseAbs2().cwiseMin(kCut * kCut).sum();
+  if (left.freedom > 0) left.left *= std::sqrt(std::max(1.0, square / left.freedom));
+  return left;
+}
+
+/// Of positions: what has no name is told by itself, and the model cannot be held to what it leaves without that.
+LeftOver left_in_position(const Explained& explained) {
+  return explained.found.unnamed.empty() ? left_within_bounds(explained.served)
+                                         : left_of(explained.after.position_spread());
+}
+
+/// The causes that the model has and whose numbers would have to stand beyond their bounds.
+std::vector<WrongSign> wrong_signs_of(const LinearProblem& served) {
+  const Background all(served.nuisance());
+  const Eigen::VectorXd change = all.estimate(served.residual());
+  const Eigen::MatrixXd covariance = all.covariance();
+  std::vector<WrongSign> wrong;
+  for (const ErrorSourcePtr& source : served.model().sources) {
+    WrongSign sign = wrong_sign_of(served, source->name(), cause_of(*source, served.batch()), change, covariance);
+    if (!sign.numbers.empty() && sign.is_beyond_chance()) wrong.push_back(std::move(sign));
+  }
+  return wrong;
+}
 
 std::string micrometres(double m) { return fmt::format("{:.3g} um", 1e6 * m); }
 
@@ -105,6 +140,41 @@ void tell_scatter(const PreparedBatch& prepared, Diagnosis& diagnosis) {
   unexplained = {true, {}, rms_beyond(scatter), chance_of_noise(scatter), as_sentence(hint)};
 }
 
+/// Whether some joint came to the poses from one side only, as far as anybody recorded.
+bool has_unseen_side(const MeasurementBatch& recorded) {
+  const auto& rows = recorded.measurements;
+  const auto comes_from = [&](std::size_t joint, int side) {
+    return std::any_of(rows.begin(), rows.end(), [&](const Measurement& m) {
+      return joint < m.context.direction.size() && m.context.direction[joint] == side;
+    });
+  };
+  const auto joints = static_cast<std::size_t>(rows.front().context.q.size());
+  for (std::size_t joint = 0; joint < joints; ++joint)
+    if (!comes_from(joint, 1) || !comes_from(joint, -1)) return true;
+  return false;
+}
+
+/// Adds what the effects of the model's own causes with a wrong sign change with; what they mean, and what to measure.
+std::optional<std::string> tell_wrong_signs(const LinearProblem& served, const MeasurementBatch& recorded,
+                                            Unexplained& unexplained) {
+  std::string text;
+  bool gives_way = false;
+  for (const WrongSign& one : wrong_signs_of(served)) {
+    text += as_sentence(what_wrong_sign_means(one)) + " ";
+    gives_way = gives_way || record_of(one.cause).gives_way;
+    for (const std::string& on : one.depends_on) {
+      auto& list = unexplained.depends_on;
+      if (std::find(list.begin(), list.end(), on) == list.end()) list.push_back(on);
+    }
+  }
+  if (text.empty()) return std::nullopt;
+  text += gives_way && has_unseen_side(recorded)
+              ? "Play that grows with the load does this where every pose comes from one side: approach the poses from "
+                "both sides of each joint, and record the sides (dir columns)."
+              : "Measure with another known payload, or without any, which tells what goes with the load.";
+  return text;
+}
+
 bool is_worse_held_out(const PreparedBatch& prepared, const Diagnosis& diagnosis) {
   if (!diagnosis.held_out_before || !diagnosis.held_out_after) return false;
   const std::size_t rows = prepared.validation.measurements.size();
@@ -130,9 +200,8 @@ double chance_of_noise(const LeftOver& left) {
 double vouched_by(const RepeatStatistics& repeats) { return scatter_beyond_noise(repeats) ? 1 : repeats.sigma_factor; }
 
 bool leaves_more_than_noise(const Explained& explained, const PreparedBatch& prepared) {
-  const LinearProblem& after = explained.after;
   const NoiseVerdict worst =
-      std::max(judge_noise(left_of(after.position_spread())), judge_noise(left_of(after.rotation_spread())));
+      std::max(judge_noise(left_in_position(explained)), judge_noise(left_of(explained.after.rotation_spread())));
   return worst == NoiseVerdict::kMoreThanNoise || scatter_beyond_noise(prepared.repeats) ||
          !sessions_beyond_noise(explained, prepared).empty();
 }
@@ -140,11 +209,11 @@ bool leaves_more_than_noise(const Explained& explained, const PreparedBatch& pre
 Remainder remainder_of(const Explained& explained, const PreparedBatch& prepared, const Diagnosis& diagnosis) {
   const bool more = !explained.found.unnamed.empty() || leaves_more_than_noise(explained, prepared) ||
                     is_worse_held_out(prepared, diagnosis);
-  return {more, more ? rms_beyond(left_of(explained.after.position_spread())) : 0};
+  return {more, more ? rms_beyond(left_in_position(explained)) : 0};
 }
 
 void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis) {
-  const LeftOver position = diagnosis.left_position = left_of(explained.after.position_spread());
+  const LeftOver position = diagnosis.left_position = left_in_position(explained);
   const LeftOver rotation = diagnosis.left_rotation = left_of(explained.after.rotation_spread());
   const std::vector<LeftBySession> beyond = sessions_beyond_noise(explained, prepared);
   tell_scatter(prepared, diagnosis);
@@ -170,7 +239,8 @@ void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagn
     unexplained.rms = std::max(unexplained.rms, rms_beyond(one.left));
     unexplained.p_value = std::min(unexplained.p_value, chance_of_noise(one.left));
   }
-  unexplained.hint = fmt::format("more than noise is left: {}. {}", what, as_sentence(more));
+  unexplained.hint = fmt::format("more than noise is left: {}. ", what);
+  unexplained.hint += tell_wrong_signs(explained.served, diagnosis.batch, unexplained).value_or(as_sentence(more));
 }
 
 }  // namespace trammel::cause_search
