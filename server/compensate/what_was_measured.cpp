@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "server/base/units.h"
 #include "server/measurement/pose_groups.h"
@@ -39,13 +40,27 @@ std::vector<double> distances_to_neighbours(Eigen::Matrix3Xd places) {
   return distances;
 }
 
-std::optional<double> reach_of(const Eigen::Matrix3Xd& places) {
-  if (places.cols() < 2) return std::nullopt;
+/// 16 x N, m: how far each place is in each direction of the outline.
+Eigen::MatrixXd along_outline(const Eigen::Matrix3Xd& places) {
+  constexpr int kCount = WhatWasMeasured::kDirections;
+  const Eigen::ArrayXd angle = Eigen::ArrayXd::LinSpaced(kCount + 1, 0, 2 * std::numbers::pi).head(kCount);
+  Eigen::MatrixX2d directions(kCount, 2);
+  directions << angle.cos().matrix(), angle.sin().matrix();
+  return directions * places.topRows<2>();
+}
+
+/// How far other poses may be from the places.
+void add_reach(WhatWasMeasured& measured) {
+  const Eigen::Matrix3Xd& places = measured.flange_B;
+  if (places.cols() < 2) return;
   const std::vector<double> distances = distances_to_neighbours(places);
-  const auto at = static_cast<std::size_t>(kNeighbour * static_cast<double>(distances.size() - 1));
-  const double diagonal = (places.rowwise().maxCoeff() - places.rowwise().minCoeff()).norm();
+  const auto within = [&](double share) {
+    return distances[static_cast<std::size_t>(share * static_cast<double>(distances.size() - 1))];
+  };
+  const double least = kLeastReach * (places.rowwise().maxCoeff() - places.rowwise().minCoeff()).norm();
   const double few = 1 + kFew / static_cast<double>(places.cols());
-  return std::max(kBeyond * few * distances[at], kLeastReach * diagonal) + kRounding;
+  measured.reach = std::max(kBeyond * few * within(kNeighbour), least) + kRounding;
+  measured.outline = along_outline(places).rowwise().maxCoeff().array() + std::max(within(0.5), least) + kRounding;
 }
 
 /// One row of each joint vector, evenly chosen where there are too many.
@@ -131,7 +146,10 @@ std::string volume_text(const WhatWasMeasured& measured) {
 }  // namespace
 
 bool WhatWasMeasured::is_near(const Chain& robot, const JointVector& q) const {
-  return !reach || nearest(flange_B, robot.flange_pose(q).translation()) <= *reach;
+  if (!reach) return true;
+  const Vector3 place = robot.flange_pose(q).translation();
+  const bool inside = outline.size() == 0 || (along_outline(place).array() <= outline.array()).all();
+  return inside && nearest(flange_B, place) <= *reach;
 }
 
 WhatWasMeasured what_was_measured(const PhysicalModel& physics, const MeasurementBatch& batch) {
@@ -154,7 +172,7 @@ WhatWasMeasured what_was_measured(const PhysicalModel& physics, const Measuremen
     const JointVector& q = batch.measurements[static_cast<std::size_t>(rows[k])].context.q;
     measured.flange_B.col(static_cast<Eigen::Index>(k)) = physics.cell->robot.flange_pose(q).translation();
   }
-  measured.reach = reach_of(measured.flange_B);
+  add_reach(measured);
   if (measured.reach)
     measured.volume = volume_near(tool_B(Eigen::all, rows), measured.lower, measured.upper, *measured.reach);
   return measured;

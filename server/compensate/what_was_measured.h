@@ -26,14 +26,20 @@ struct WhatWasMeasured {
   /// m: a pose whose flange is farther from all of them is another region of the robot. Empty where one joint vector
   /// was measured, which tells no distance.
   std::optional<double> reach;
+  /// m: how far the places go in 16 horizontal directions, x of B first, and a little farther. A pose beyond is out of
+  /// the outline that they have from above: where places are few, their reach alone goes round to the robot's other
+  /// side. Empty without a reach, and in models from before it was kept.
+  Eigen::VectorXd outline;
+  static constexpr int kDirections = 16;
 
-  /// Whether the nominal flange at `q` is within reach of a place where it was measured.
+  /// Whether the nominal flange at `q` is within reach of a place where it was measured, and inside their outline.
   [[nodiscard]] bool is_near(const Chain& robot, const JointVector& q) const;
 };
 
 /// Of the poses of `batch`, which `physics` knows the tools of. `reach` follows the distances between the poses
 /// themselves: 1.5 times that within which 95 % of them have a neighbour, more where they are few, and no less than a
-/// twentieth of the region. What stands at one joint vector is one place and no neighbour of itself.
+/// twentieth of the region. The outline goes beyond the places by the median distance between neighbours. What stands
+/// at one joint vector is one place and no neighbour of itself.
 [[nodiscard]] WhatWasMeasured what_was_measured(const PhysicalModel& physics, const MeasurementBatch& batch);
 
 /// The same for people, each part by itself. Of a model without it, parts are `not on record`.

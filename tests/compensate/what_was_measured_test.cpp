@@ -122,7 +122,10 @@ TEST(WhatWasMeasured, FreshPosesOfTheSamePlanAreNear) {
     for (const int poses : {30, 60, 250}) {
       double share = 0;
       for (std::uint64_t seed = 1; seed <= 5; ++seed) share += share_near(cell, poses, seed) / 5;
-      EXPECT_GE(share, 0.99) << poses << (cell->workspace ? " poses in front" : " poses all around");
+      EXPECT_GE(share, poses < 60    ? 0.93
+                       : poses < 250 ? 0.95
+                                     : 0.985)
+          << poses << (cell->workspace ? " poses in front" : " poses all around");
     }
   }
 }
@@ -151,6 +154,54 @@ TEST(WhatWasMeasured, PosesBehindARobotThatWasMeasuredInFrontAreOutOfDomainAndHe
   int inside = 0;
   for (const JointVector& q : poses) inside += model.predict(q, "spindle", "spindle").in_domain ? 1 : 0;
   EXPECT_EQ(inside, 0);
+}
+
+/// Share of fresh poses behind the robot that are in domain, of a robot that was measured at `poses` places in front.
+double share_behind(int poses) {
+  const auto cell = cell_in_front();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  const PhysicalModel physics = demand(make_physical_model(cell, {"base"}));
+  int inside = 0, all = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const WhatWasMeasured measured = what_was_measured(physics, test::measured(robot, poses, seed));
+    const Eigen::MatrixXd q = latin_hypercube(cell->joint_ranges, 2000, seed);
+    for (Eigen::Index i = 0; i < q.rows(); ++i) {
+      const JointVector pose = q.row(i).transpose();
+      if (cell->robot.flange_pose(pose).translation().x() > -0.2) continue;
+      inside += measured.is_near(cell->robot, pose) ? 1 : 0;
+      ++all;
+    }
+  }
+  return static_cast<double>(inside) / all;
+}
+
+TEST(WhatWasMeasured, FewPosesInFrontMakeNoDomainBehindTheRobot) {
+  EXPECT_EQ(share_behind(12), 0);
+  EXPECT_EQ(share_behind(30), 0);
+}
+
+/// Where the region begins near the base its edge is nearer than the places are to each other.
+TEST(WhatWasMeasured, PosesBeyondTheOutlineFromAboveAreOutOfDomain) {
+  const auto cell = test::cell_7();
+  MeasurementBatch batch = test::measured(test::chapter_5_robot(cell), 400, 1);
+  std::erase_if(batch.measurements,
+                [&](const Measurement& m) { return cell->robot.flange_pose(m.context.q).translation().x() < 0.3; });
+  batch.measurements.resize(30);
+  const WhatWasMeasured measured = what_was_measured(demand(make_physical_model(cell, {"base"})), batch);
+  WhatWasMeasured before = measured;
+  before.outline.resize(0);
+  int behind = 0, in_reach = 0, inside = 0;
+  const Eigen::MatrixXd fresh = demand(plan_poses(*cell, {2000, 5}));
+  for (Eigen::Index i = 0; i < fresh.rows(); ++i) {
+    const JointVector q = fresh.row(i).transpose();
+    if (cell->robot.flange_pose(q).translation().x() > -0.3) continue;
+    ++behind;
+    in_reach += before.is_near(cell->robot, q) ? 1 : 0;
+    inside += measured.is_near(cell->robot, q) ? 1 : 0;
+  }
+  ASSERT_GT(behind, 200);
+  EXPECT_GT(in_reach, behind / 5) << "of distances alone";
+  EXPECT_LT(inside, behind / 50);
 }
 
 TEST(WhatWasMeasured, ItsVolumeIsThatOfThePosesNotOfTheJointsRanges) {
@@ -206,6 +257,7 @@ TEST(WhatWasMeasured, AFileOfAnotherArmsSidesIsRefused) {
   EXPECT_FALSE(deserialize(changed(text, [](json& c) { c["measured"]["approaches"].erase(0); }), "m"));
   EXPECT_FALSE(deserialize(changed(text, [](json& c) { c["measured"]["reach_m"] = -1; }), "m"));
   EXPECT_FALSE(deserialize(changed(text, [](json& c) { c["measured"].erase("flange_m"); }), "m"));
+  EXPECT_FALSE(deserialize(changed(text, [](json& c) { c["measured"]["outline_m"]["values"] = {1}; }), "m"));
 }
 
 }  // namespace

@@ -340,7 +340,7 @@ void add_train(CLI::App& app, Action& chosen) {
   add_seed_option(*command, arguments->seed, "Seed of the search and of the rows held out");
   command
       ->add_option("--validation-share", arguments->validation_share,
-                   "Share of the rows to hold out, 0 to 0.9, where the batch has no set column; 0: none are held out")
+                   "Share of the poses to hold out, 0 to 0.9, where the batch has no set column; 0: none are held out")
       ->check(CLI::Range(0.0, 0.9))
       ->capture_default_str();
   command->add_flag(

@@ -148,6 +148,11 @@ Status check_measured(const ModelParts& parts) {
         .beyond(measured.approaches.size(), joints);
   if ((measured.lower.array() > measured.upper.array()).any() || measured.reach.value_or(0) < 0)
     return refused("model: measured: its volume ends before it begins").of("measured");
+  constexpr int kNeeded = WhatWasMeasured::kDirections;
+  if (const auto given = measured.outline.size(); given != 0 && given != kNeeded)
+    return refused("model: measured: an outline in {} directions, they are {}", given, kNeeded)
+        .of("measured")
+        .beyond(given, kNeeded);
   return {};
 }
 

@@ -232,6 +232,7 @@ WhatWasMeasured measured_from(const Json& json) {
   if (places.cols() != 3 || places.rows() < 1) wrong("expected places of the flange, three columns", json.at("poses"));
   measured.flange_B = places.transpose();
   measured.reach = number_if(json, "reach_m");
+  if (json.contains("outline_m")) measured.outline = vector_from(json.at("outline_m"));
   if (!json.contains("temperature_c")) return measured;
   const Json& temperature = json.at("temperature_c");
   measured.temperature = {number_from(temperature, "least"), number_from(temperature, "most")};

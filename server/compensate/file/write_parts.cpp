@@ -210,6 +210,7 @@ Json json_of(const WhatWasMeasured& measured) {
   if (measured.temperature)
     json["temperature_c"] = {{"least", measured.temperature->first}, {"most", measured.temperature->second}};
   if (measured.reach) json["reach_m"] = *measured.reach;
+  if (measured.outline.size() > 0) json["outline_m"] = matrix_json(measured.outline);
   return json;
 }
 
