@@ -457,11 +457,12 @@ class Service(unittest.TestCase):
     def setUpClass(cls):
         folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(folder.cleanup)
+        cls.folder = pathlib.Path(folder.name)
         port = own_ports(cls)
         domain = 1 + port // 8 % 48
         text = CELL.read_text().replace("../models", str(SOURCE / "models")).replace("bias: auto", "bias: none")
-        (pathlib.Path(folder.name) / "cell-7.yaml").write_text(text)
-        config = pathlib.Path(folder.name) / "server.yaml"
+        (cls.folder / "cell-7.yaml").write_text(text)
+        config = cls.folder / "server.yaml"
         config.write_text(f"version: 1\nserver: python-{port}\ncells: [cell-7.yaml]\nstore: trammel.db\n")
         cls.daemon = subprocess.Popen([BUILD / "server/trammeld", "--config", config, "--port", str(port), "--domain", str(domain)],
                                       stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
@@ -504,6 +505,26 @@ class Service(unittest.TestCase):
         self.assertEqual(there.status, here.status)
         np.testing.assert_allclose(there.joints_deg, here.joints_deg, atol=1e-9)
         np.testing.assert_allclose(there.turn_after_deg, here.turn_after_deg, atol=1e-9)
+
+    def test_a_session_is_answered_however_its_hosts_clock_is_set(self):
+        clock = self.folder / "clock"
+        clock.write_bytes(bytes(8))
+        program = """
+import struct, sys, trammel
+options = dict(domain=int(sys.argv[2]), hosts=[sys.argv[3]], timeout_s=20)
+session = trammel.Session(**options)
+for years in (0, -100, 140, 0):
+    with open(sys.argv[1], "r+b") as clock:
+        clock.write(struct.pack("q", years * 365 * 24 * 3600))
+    for _ in range(5):
+        session.models("cell-7")
+    trammel.Session(**options).models("cell-7")  # somebody new
+print("answered")
+"""
+        moved = {**os.environ, "LD_PRELOAD": str(BUILD / "tests/libtrammel_moved_clock.so"), "TRAMMEL_TEST_CLOCK": str(clock)}
+        done = subprocess.run([sys.executable, "-c", program, clock, str(self.where["domain"]), *self.where["hosts"]], env=moved,
+                              capture_output=True, text=True, timeout=100)
+        self.assertEqual((done.stdout, done.stderr), ("answered\n", ""))
 
     def test_servers_are_found_by_host_and_port(self):
         session = trammel.Session(**self.where, timeout_s=30)
