@@ -67,6 +67,9 @@ void set_writer_times(dds::DataWriterQos& qos, std::chrono::milliseconds heartbe
   qos.publish_mode().kind = dds::SYNCHRONOUS_PUBLISH_MODE;
   qos.reliable_writer_qos().times.heartbeatPeriod = to_duration(heartbeat);
   qos.reliable_writer_qos().times.nackResponseDelay = to_duration(std::chrono::milliseconds(0));
+  // None between the fragments of a sample: a reader of Cyclone DDS takes what stands in the first HEARTBEAT that it
+  // hears for history, and drops the sample that is being sent.
+  qos.reliable_writer_qos().disable_heartbeat_piggyback = true;
 }
 
 void set_reader_times(dds::DataReaderQos& qos) {

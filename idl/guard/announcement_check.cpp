@@ -42,6 +42,7 @@ enum ParameterId : std::uint16_t {
 };
 
 constexpr std::size_t kLocator = 24, kGuid = 16;
+constexpr unsigned char kListBigEndian = 0x02, kListLittleEndian = 0x03;  // how a list is serialized
 constexpr std::uint32_t kMostItems = 256;  // partitions, properties, representations of one endpoint
 constexpr int kMostLocators = 64;          // of one announcement
 
@@ -229,7 +230,6 @@ Fault check_inline_qos(Reader& rest, Bytes source, bool names_source, bool& says
 }
 
 Fault check_announcement(Bytes payload, Bytes source, EditedMessage& message, Reachable& reachable) {
-  constexpr unsigned char kListBigEndian = 0x02, kListLittleEndian = 0x03;
   if (payload.size() < 4 || payload[0] != 0) return Dropped::kParameters;
   if (payload[1] != kListBigEndian && payload[1] != kListLittleEndian) return Dropped::kParameters;
   const bool little_endian = payload[1] == kListLittleEndian;
@@ -255,6 +255,16 @@ Fault check_announcement(Bytes payload, Bytes source, EditedMessage& message, Re
     if (parameter.id == kPartition && has_wildcard(Reader(parameter.value, little_endian))) return Dropped::kWildcard;
     if (parameter.id == kLease && !cut_lease(parameter, message, reachable)) return Dropped::kParameters;
   }
+}
+
+std::optional<Bytes> guid_in_key(Bytes key) {
+  if (key.size() < 4 || key[0] != 0 || (key[1] != kListBigEndian && key[1] != kListLittleEndian)) return std::nullopt;
+  Reader list(key.subspan(4), key[1] == kListLittleEndian);
+  while (const auto parameter = next_parameter(list)) {
+    const bool names = parameter->id == kParticipantGuid || parameter->id == kEndpointGuid || parameter->id == kKeyHash;
+    if (names && parameter->value.size() == kGuid) return parameter->value;
+  }
+  return std::nullopt;
 }
 
 Fault check_handshake(Bytes payload, Bytes source) {

@@ -50,6 +50,9 @@ struct Reachable {
 [[nodiscard]] std::optional<Dropped> check_announcement(Bytes payload, Bytes source, EditedMessage& message,
                                                         Reachable& reachable);
 
+/// The GUID in the key of a participant or endpoint that has gone: a list of parameters. Empty: there is none.
+[[nodiscard]] std::optional<Bytes> guid_in_key(Bytes key);
+
 /// The payload of a message of the authentication handshake, which comes before anybody is known. It is of `source`,
 /// and so is the announcement within: the library compares that with the certificate, and not with who speaks.
 [[nodiscard]] std::optional<Dropped> check_handshake(Bytes payload, Bytes source);

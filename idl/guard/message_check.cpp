@@ -163,9 +163,27 @@ std::optional<Dropped> MessageCheck::check_data(const Submessage& submessage) {
   }
   if (!payload && !key) return says_status ? Fault() : Fault(Dropped::kLength);
   if (after.rest().size() < 4) return Dropped::kLength;
-  if (!payload) return {};
+  if (!payload) return announcement ? check_key_of_gone(submessage, after.rest()) : Fault();
   const bool handshake = head->writer == kHandshake || head->reader == kHandshakeReader;
   return handshake ? check_handshake(after.rest(), source_) : check_announced(submessage, head->writer, after.rest());
+}
+
+/// Cyclone DDS says by a key alone who has gone. The library takes that from the inline QoS only: the key moves there,
+/// over the sentinel of the QoS and its own beginning.
+std::optional<Dropped> MessageCheck::check_key_of_gone(const Submessage& data, Bytes key) {
+  constexpr std::uint16_t kKeyHash = 0x0070;
+  const auto guid = guid_in_key(key);
+  if (!guid) return Dropped::kParameters;
+  if (!std::equal(named_.begin(), named_.end(), guid->begin())) return Dropped::kSource;
+  if ((data.flags & kInlineQos) == 0) return {};
+  const Bytes place = message_.subspan(static_cast<std::size_t>(key.data() - message_.data()) - 4, 8 + guid->size());
+  edited_.put(place.first(2), kKeyHash, data.little_endian());
+  edited_.put(place.subspan(2, 2), static_cast<std::uint16_t>(guid->size()), data.little_endian());
+  edited_.put(place.subspan(4, guid->size()), *guid);
+  edited_.put(place.last(4).first(2), kSentinel, data.little_endian());
+  edited_.put(place.last(2), std::uint16_t{0}, data.little_endian());
+  edited_.put(flags_of(data), std::array{static_cast<unsigned char>(data.flags & ~kKey)});
+  return {};
 }
 
 /// The writer is reliable: what never arrives is asked for again for ever, and all behind it waits. So what may not
@@ -184,8 +202,8 @@ std::optional<Dropped> MessageCheck::check_relayed_data(const Submessage& submes
 /// In place: it skips this one number.
 void MessageCheck::make_gap(const Submessage& data, std::int64_t number) {
   const bool little_endian = data.little_endian();
-  const std::array<unsigned char, 2> head = {kGap, static_cast<unsigned char>(data.flags & kLittleEndian)};
-  edited_.put(message_.subspan(static_cast<std::size_t>(data.body.data() - message_.data()) - 4, 2), head);
+  edited_.put(id_of(data), std::array<unsigned char, 1>{kGap});
+  edited_.put(flags_of(data), std::array{static_cast<unsigned char>(data.flags & kLittleEndian)});
   edited_.put(data.body.first(16), data.body.subspan(4, 16));  // reader, writer, the first number that is skipped
   edited_.put_sequence_number(data.body.subspan(16, 8), number + 1, little_endian);
   edited_.put(data.body.subspan(24, 4), std::uint32_t{0}, little_endian);
@@ -203,9 +221,16 @@ void MessageCheck::ignore_end(std::uint32_t writer, const Submessage& data, std:
   blank(data);
 }
 
+Bytes MessageCheck::id_of(const Submessage& submessage) const {
+  return message_.subspan(static_cast<std::size_t>(submessage.body.data() - message_.data()) - 4, 1);
+}
+
+Bytes MessageCheck::flags_of(const Submessage& submessage) const {
+  return message_.subspan(static_cast<std::size_t>(submessage.body.data() - message_.data()) - 3, 1);
+}
+
 void MessageCheck::blank(const Submessage& submessage) {
-  edited_.put(message_.subspan(static_cast<std::size_t>(submessage.body.data() - message_.data()) - 4, 1),
-              std::array<unsigned char, 1>{kPad});
+  edited_.put(id_of(submessage), std::array<unsigned char, 1>{kPad});
 }
 
 /// Who names us has heard us.
@@ -275,8 +300,8 @@ std::optional<Dropped> MessageCheck::cut_too_large(const Submessage& submessage,
   constexpr unsigned char kKeyOfFragment = 0x04;
   if ((submessage.flags & kKeyOfFragment) != 0) return Dropped::kSampleSize;
   const auto flags = static_cast<unsigned char>((submessage.flags & (kLittleEndian | kInlineQos)) | kPayload);
-  edited_.put(message_.subspan(static_cast<std::size_t>(submessage.body.data() - message_.data()) - 4, 2),
-              std::array<unsigned char, 2>{kData, flags});
+  edited_.put(id_of(submessage), std::array<unsigned char, 1>{kData});
+  edited_.put(flags_of(submessage), std::array{flags});
   edited_.put(payload.subspan(kOptionsAt, 2), options_of_cut(sample_size));
   return {};
 }

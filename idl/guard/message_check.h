@@ -34,8 +34,12 @@ class MessageCheck {
   Fault check_submessage(const Submessage& submessage, Bytes behind);
   Fault check_data(const Submessage& submessage);
   Fault check_relayed_data(const Submessage& submessage);
+  Fault check_key_of_gone(const Submessage& data, Bytes key);
   void make_gap(const Submessage& data, std::int64_t number);
   void blank(const Submessage& submessage);
+  /// The octets of the message that say them.
+  [[nodiscard]] Bytes id_of(const Submessage& submessage) const;
+  [[nodiscard]] Bytes flags_of(const Submessage& submessage) const;
   [[nodiscard]] bool is_unproven(std::uint32_t writer) const;
   void ignore_end(std::uint32_t writer, const Submessage& data, std::int64_t number);
   Fault check_destination(const Submessage& submessage);

@@ -303,12 +303,37 @@ PacketBytes goodbye() {
   const PacketBytes gone = ParameterList().guid(0x0070, kSource, 0x000001c1).add(0x0071, {0, 0, 0, 3}).bytes();
   return from().data({0, kAnnouncer, 2, gone, {}}).bytes();
 }
+/// The same as Cyclone DDS says it: by a key, and in the inline QoS the status alone.
+PacketBytes goodbye_by_key(const Prefix& who, std::uint32_t by = kAnnouncer) {
+  const std::uint16_t id = by == kAnnouncer ? 0x0050 : 0x005a;
+  const PacketBytes status = ParameterList().add(0x0071, {0, 0, 0, 3}).bytes();
+  const PacketBytes key = ParameterList().guid(id, who, 0x000001c1).payload();
+  PacketBytes message = from().data({0, by, 2, status, key}).bytes();
+  message[kHeader + 1] = kLittleEndian | kInlineQos | kKey;
+  return message;
+}
 /// The ids of the submessages.
 std::vector<int> kinds(const PacketBytes& message) {
   std::vector<int> ids;
   Bytes rest = Bytes(message).subspan(kHeader);
   while (const auto submessage = next_submessage(rest)) ids.push_back(submessage->id);
   return ids;
+}
+
+// The library reads who has gone from the inline QoS, and from nowhere else.
+TEST(Guard, WhoSaysByAKeyThatItHasGoneSaysItByAHash) {
+  for (const std::uint32_t by : {kAnnouncer, kPublications, kSubscriptions}) {
+    Guard guard(kMaxTextSample);
+    const PacketBytes passed = let_in(guard, goodbye_by_key(kSource, by));
+    ASSERT_FALSE(passed.empty());
+    const PacketBytes hash = ParameterList().add(0x0071, {0, 0, 0, 3}).guid(0x0070, kSource, 0x000001c1).bytes();
+    const auto at = std::search(passed.begin(), passed.end(), hash.begin(), hash.end());
+    EXPECT_EQ(at - passed.begin(), static_cast<std::ptrdiff_t>(kHeader + 4 + 20)) << "behind the head of its sample";
+    EXPECT_EQ(passed[kHeader + 1], kLittleEndian | kInlineQos);
+  }
+  EXPECT_EQ(fate(goodbye_by_key(kOther)), Dropped::kSource);
+  Guard secured(kMaxTextSample, nullptr, {}, true);
+  EXPECT_EQ(kinds(let_in(secured, goodbye_by_key(kSource))), std::vector<int>{kPad});
 }
 
 TEST(Guard, WhereParticipantsProveWhoTheyAreNobodyIsSentAwayWithoutProof) {

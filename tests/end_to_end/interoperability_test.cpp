@@ -49,6 +49,14 @@ TEST_F(Interoperability, ACycloneDdsClientGetsItsPredictionAndItsCorrection) {
   EXPECT_EQ(stranger.err, "cyclone_client: no ServiceStatus\n") << "it looked at the same port from another domain";
 }
 
+// It says that it leaves as Fast DDS does not, and leaves the partition of its replies to the next.
+TEST_F(Interoperability, ACycloneDdsClientThatIsStartedAgainIsAnsweredInThePartitionThatTheFirstHasLeft) {
+  for (int start = 0; start < 3; ++start) {
+    const test::Finished client = run(TRAMMEL_CYCLONE_CLIENT, options_.domain, "5");
+    EXPECT_EQ(client.exit_code, 0) << client.err;
+  }
+}
+
 TEST_F(Interoperability, AClientOfTheContractBeforeIsToldThatItMustBeUpdated) {
   const test::Finished client = run(TRAMMEL_CYCLONE_CLIENT_1, options_.domain, "20");
   EXPECT_EQ(client.exit_code, 0) << client.err;

@@ -57,6 +57,31 @@ TEST_F(NetworkTest, AnotherHostSubmitsABatchAndHasItsTargetsCorrected) {
   EXPECT_EQ(corrected.exit_code, 0) << corrected.out << corrected.err;
 }
 
+#ifdef TRAMMEL_CYCLONE_CLIENT
+// As its maker ships it Cyclone DDS sends datagrams of up to 14720 bytes, which IP cuts into frames; ours are of 1400.
+TEST_F(NetworkTest, ACycloneClientAsItsMakerShipsItIsAnsweredHoweverMuchItAsks) {
+  start("without_security: true");
+  const std::string batch = folder_.write("batch.csv", test::virtual_batch_csv(120, 3));
+  const auto submitted = elsewhere({"submit", "--cell", "cell-7", "--batch", batch, "--watch"});
+  ASSERT_EQ(submitted.exit_code, 0) << submitted.out << submitted.err;
+  for (const char* sizes : {"", "<MaxMessageSize>65500B</MaxMessageSize><FragmentSize>65000B</FragmentSize>"}) {
+    const std::string uri = fmt::format(
+        "CYCLONEDDS_URI=<CycloneDDS><Domain><General><Interfaces><NetworkInterface address=\"{}\" "
+        "multicast=\"false\"/></Interfaces><AllowMulticast>false</AllowMulticast>{}</General><Discovery>"
+        "<ParticipantIndex>auto</ParticipantIndex><Peers><Peer address=\"{}:{}\"/></Peers></Discovery></Domain>"
+        "</CycloneDDS>",
+        hosts_.address(1), sizes, hosts_.address(0), daemon_.port());
+    for (const char* poses : {"100", "2000"}) {
+      const auto client = test::run(hosts_.on(1, {"/usr/bin/env", uri, TRAMMEL_CYCLONE_CLIENT,
+                                                  std::to_string(daemon_.domain()), "cell-7", "10", poses}),
+                                    kLimit);
+      EXPECT_EQ(client.exit_code, 0) << client.out << client.err;
+      EXPECT_NE(client.out.find(fmt::format("items={}\n", poses)), std::string::npos) << client.out << client.err;
+    }
+  }
+}
+#endif
+
 TEST_F(NetworkTest, AfterItsInterfaceWasGoneTheServiceAnswersAgain) {
   start("without_security: true");
   ASSERT_EQ(elsewhere({"status"}).exit_code, 0);
