@@ -11,8 +11,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// How long a reply is kept for a reader that is not matched: DDS matches it within a few announcements, or never.
-constexpr auto kPatience = wire::kLease;
 /// A channel that was opened or used so lately is not given to another client.
 constexpr auto kGrace = 5 * wire::kAnnouncement;
 constexpr std::chrono::milliseconds kLook{500};  // for what is kept too long
@@ -148,7 +146,7 @@ ReplyChannels::Writer ReplyChannels::writer(const std::string& participant, cons
 }
 
 void ReplyChannels::put(Outbox& outbox, const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) {
-  const Parcel parcel{to.participant, to.partition, to.topic, std::move(reply), bytes, Clock::now() + kPatience};
+  const Parcel parcel{to.participant, to.partition, to.topic, std::move(reply), bytes, Clock::now() + kReplyPatience};
   if (!book_.may_listen(to.participant, to.partition) || !outbox.put(parcel)) ++unheard_;
 }
 

@@ -4,7 +4,12 @@
 #include <memory>
 #include <string>
 
+#include "idl/limits.h"
+
 namespace trammel {
+
+/// How long a reply is kept for a reader that is not matched: DDS matches it within a few announcements, or never.
+inline constexpr auto kReplyPatience = wire::kLease;
 
 /// Where a reply goes.
 struct ReplyAddress {

@@ -21,18 +21,13 @@ using wire::ros2::CorrectTargets_;
 /// A publisher of questions and a subscription to answers.
 class Node final : private wire::dds::DataWriterListener, private wire::dds::DataReaderListener {
  public:
-  explicit Node(const DdsOptions& options) {
+  explicit Node(const DdsOptions& options, bool listens = true) {
     using Ros = wire::Ros2CorrectTargets;
     participant_ = wire::make_participant({"node", options.domain, "127.0.0.1", 0, {options.port}}).value();
     auto* questions =
         wire::make_topic(*participant_, Ros::kRequestTopic, new wire::SafeType<Ros::Request>(wire::kMaxComputeSample))
             .value();
-    auto* answers =
-        wire::make_topic(*participant_, Ros::kReplyTopic, new wire::SafeType<Ros::Reply>(wire::kMaxComputeSample))
-            .value();
-    participant_->create_subscriber(wire::subscriber_qos({}))
-        ->create_datareader(answers, wire::call_reader_qos(1000), this,
-                            wire::dds::StatusMask::data_available() << wire::dds::StatusMask::subscription_matched());
+    if (listens) listen();
     writer_ = participant_->create_publisher(wire::publisher_qos({}))
                   ->create_datawriter(questions, wire::call_writer_qos(1000), this,
                                       wire::dds::StatusMask::publication_matched());
@@ -41,8 +36,20 @@ class Node final : private wire::dds::DataWriterListener, private wire::dds::Dat
   Node(const Node&) = delete;
   Node& operator=(const Node&) = delete;
 
+  void listen() {
+    using Ros = wire::Ros2CorrectTargets;
+    auto* answers =
+        wire::make_topic(*participant_, Ros::kReplyTopic, new wire::SafeType<Ros::Reply>(wire::kMaxComputeSample))
+            .value();
+    participant_->create_subscriber(wire::subscriber_qos({}))
+        ->create_datareader(answers, wire::call_reader_qos(1000), this,
+                            wire::dds::StatusMask::data_available() << wire::dds::StatusMask::subscription_matched());
+  }
   [[nodiscard]] bool wait_until_matched() {
     return wait([this] { return readers_ > 0 && writers_ > 0; });
+  }
+  [[nodiscard]] bool wait_until_heard() {
+    return wait([this] { return readers_ > 0; });
   }
   void ask(CorrectTargets_ question) { writer_->write(&question); }
   /// Until at least `count` have come.
@@ -131,6 +138,23 @@ TEST_F(Ros2Service, ARepeatIsAnsweredAgainAndSomethingElseUnderItsIdIsAConflict)
   EXPECT_EQ(answers[0].status().size(), 3u);
   EXPECT_EQ(answers[1].error_before_m(), answers[0].error_before_m());
   EXPECT_EQ(answers[2].result(), static_cast<std::uint32_t>(wire::RESULT_CONFLICT));
+}
+
+// The two are never matched at once: what is written before the node's reader is known, nobody gets.
+TEST_F(Ros2Service, ANodeWhoseReaderIsMatchedAfterItsQuestionIsAnswered) {
+  Node late(options_, false);
+  ASSERT_TRUE(late.wait_until_heard());
+  late.ask(question("early"));
+  late.listen();
+  EXPECT_EQ(late.wait_for_answers(1)[0].id(), "early");
+}
+
+// As two processes of a command line do it.
+TEST_F(Ros2Service, WhatOneNodeAsksAnotherOneHears) {
+  Node mute(options_, false);
+  ASSERT_TRUE(mute.wait_until_heard());
+  mute.ask(question("for all"));
+  EXPECT_EQ(node_.wait_for_answers(1)[0].id(), "for all");
 }
 
 TEST_F(Ros2Service, EachQuestionOfAFloodIsAnsweredOnceAndWhatHasNoRoomIsToldSo) {

@@ -2,20 +2,29 @@
 
 #include <pthread.h>
 
+#include <chrono>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
+#include <list>
+#include <map>
 #include <stop_token>
+#include <string>
 #include <thread>
+#include <utility>
 
 #include "idl/ros2.h"
-#include "server/base/bounded_queue.h"
+#include "server/base/mutex.h"
 #include "server/dds/ros2/translated.h"
+#include "server/dds/schedule/outbox.h"
 
 namespace trammel {
 namespace {
 
-/// Writes answers where all nodes hear them. Thread-safe.
+using Clock = std::chrono::steady_clock;
+
+/// Writes answers where all nodes hear them, once the node that asked does: its reader may be matched a little later
+/// than its writer, and nobody gets what was written before. Thread-safe.
 template <typename Ros>
-class Ros2Replies final : public ReplySink {
+class Ros2Replies final : public ReplySink, private wire::dds::DataWriterListener {
  public:
   using Reply = typename Ros::Operation::Reply::type;
   using Message = typename Ros::Reply::type;
@@ -27,7 +36,9 @@ class Ros2Replies final : public ReplySink {
     std::unique_ptr<Ros2Replies> replies(new Ros2Replies(core, writing));
     replies->publisher_ = core.participant.create_publisher(wire::publisher_qos({}));
     if (replies->publisher_ != nullptr)
-      replies->writer_ = replies->publisher_->create_datawriter(*topic, wire::call_writer_qos(wire::kReplyDepth));
+      replies->writer_ =
+          replies->publisher_->create_datawriter(*topic, wire::call_writer_qos(wire::kReplyDepth), replies.get(),
+                                                 wire::dds::StatusMask::publication_matched());
     if (replies->writer_ == nullptr)
       return failure(ErrorCode::kInternal, "cannot create the writer of {}", Ros::kReplyTopic);
     replies->start();
@@ -42,9 +53,69 @@ class Ros2Replies final : public ReplySink {
   Ros2Replies(const Ros2Replies&) = delete;
   Ros2Replies& operator=(const Ros2Replies&) = delete;
 
-  void send(const ReplyAddress&, std::shared_ptr<void> reply, std::size_t) override {
+  void send(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) override {
+    if (listens(to.participant)) return write(reply.get());
+    post(to, std::move(reply), bytes);
+  }
+
+  /// What has no room is dropped: so many refusals wait only where nodes ask faster than they can be told.
+  void post(const ReplyAddress& to, std::shared_ptr<void> reply, std::size_t bytes) override {
+    {
+      const MutexLock lock(mutex_);
+      static_cast<void>(
+          waiting_.put({to.participant, {}, to.topic, std::move(reply), bytes, Clock::now() + kReplyPatience}));
+      has_news_ = true;
+    }
+    due_.notify_all();
+  }
+
+ private:
+  static constexpr std::size_t kWrittenAtOnce = 64;
+  static constexpr std::chrono::milliseconds kLook{500};  // for what waits too long
+
+  Ros2Replies(ServiceCore& core, WorkUnderWay& writing) : core_(core), writing_(writing), waiting_(OutboxLimits{}) {}
+
+  void on_publication_matched(wire::dds::DataWriter*, const wire::dds::PublicationMatchedStatus& status) override {
+    const auto reader = eprosima::fastrtps::rtps::iHandle2GUID(status.last_subscription_handle);
+    {
+      const MutexLock lock(mutex_);
+      const auto entry = readers_.try_emplace(wire::participant_of(reader), 0).first;
+      entry->second += status.current_count_change;
+      if (entry->second <= 0) readers_.erase(entry);
+      has_news_ = true;
+    }
+    due_.notify_all();
+  }
+
+  [[nodiscard]] bool listens(const std::string& participant) const {
+    const MutexLock lock(mutex_);
+    return readers_.contains(participant);
+  }
+
+  void start() {
+    thread_ = std::jthread([this](const std::stop_token& stop) {
+      ::pthread_setname_np(::pthread_self(), "ros2 replies");
+      while (!stop.stop_requested()) {
+        for (const Parcel& parcel : wait_for_due(stop)) write(parcel.reply.get());
+      }
+    });
+  }
+
+  /// A question may come from another process than the one that hears the answer: after a while it is written as well.
+  [[nodiscard]] std::list<Parcel> wait_for_due(const std::stop_token& stop) {
+    MutexLock lock(mutex_);
+    due_.wait_for(lock, stop, kLook, [this]() TRAMMEL_REQUIRES(mutex_) { return has_news_; });
+    const auto now = Clock::now();
+    auto due = waiting_.take(kWrittenAtOnce, [&](const Parcel& one) TRAMMEL_REQUIRES(mutex_) {
+      return one.until <= now || readers_.contains(one.client);
+    });
+    has_news_ = due.size() == kWrittenAtOnce;
+    return due;
+  }
+
+  void write(const void* reply) {
     const WorkUnderWay::Piece piece = writing_.begin();
-    Message message = ros2::answered(*static_cast<const Reply*>(reply.get()), core_.trainer.cells());
+    Message message = ros2::answered(*static_cast<const Reply*>(reply), core_.trainer.cells());
     if (writer_->write(&message)) return;
     Message error;
     error.id(message.id());
@@ -54,28 +125,15 @@ class Ros2Replies final : public ReplySink {
     writer_->write(&error);
   }
 
-  /// What has no room is dropped: so many refusals wait only where nodes ask faster than they can be told.
-  void post(const ReplyAddress&, std::shared_ptr<void> reply, std::size_t) override {
-    static_cast<void>(posted_.try_push(std::move(reply)));
-  }
-
- private:
-  static constexpr std::size_t kPosted = 4096;
-
-  Ros2Replies(ServiceCore& core, WorkUnderWay& writing) : core_(core), writing_(writing), posted_(kPosted) {}
-
-  void start() {
-    thread_ = std::jthread([this](const std::stop_token& stop) {
-      ::pthread_setname_np(::pthread_self(), "ros2 replies");
-      while (auto reply = posted_.pop(stop)) send({}, std::move(*reply), 0);
-    });
-  }
-
   ServiceCore& core_;
   WorkUnderWay& writing_;
   wire::dds::Publisher* publisher_ = nullptr;
   wire::dds::DataWriter* writer_ = nullptr;
-  BoundedQueue<std::shared_ptr<void>> posted_;
+  mutable Mutex mutex_;
+  Condition due_;
+  Outbox waiting_ TRAMMEL_GUARDED_BY(mutex_);
+  std::map<std::string, int> readers_ TRAMMEL_GUARDED_BY(mutex_);  // matched, of each participant
+  bool has_news_ TRAMMEL_GUARDED_BY(mutex_) = false;
   std::jthread thread_;
 };
 
