@@ -2,9 +2,10 @@
 // with a session that has been answered once and then only stays. Measured on the line while they come and while
 // nobody asks, in the server's memory, and after they have gone.
 // --clients N..., --cells N, --seconds N (of quiet, each). The clients are this program again, --stay.
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <chrono>
-#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -38,8 +39,8 @@ struct Stay {
   int clients = 0;
 };
 
-/// Opens sessions, has each answered once, says so, and stays until it is ended.
-int stay(const Stay& asked) {
+/// Opens sessions, has each answered once, says so, and stays until SIGTERM ends the process.
+[[noreturn]] void stay(const Stay& asked) {
   client::SessionOptions options;
   options.domain = asked.domain;
   options.servers = {{asked.host, asked.port}};
@@ -51,12 +52,7 @@ int stay(const Stay& asked) {
   }
   std::cout << "answered\n";
   std::cout.flush();
-  sigset_t ends;
-  sigemptyset(&ends);
-  sigaddset(&ends, SIGTERM);
-  sigprocmask(SIG_BLOCK, &ends, nullptr);
-  int which = 0;
-  return sigwait(&ends, &which);
+  while (true) ::pause();
 }
 
 /// A daemon of many cells on the first host.
@@ -192,7 +188,7 @@ int main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   if (!stay.host.empty()) {
     stay.clients = settings.clients.front();
-    return trammel::stay(stay);
+    trammel::stay(stay);
   }
   for (const int count : settings.clients) {
     const trammel::test::TwoHosts hosts;
