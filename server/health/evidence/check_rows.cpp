@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 
 #include "server/robot/rigid_fit.h"
 
@@ -19,6 +20,8 @@ constexpr double kFarOff = 6;      // times the median: a pose that does not say
 constexpr int kLocalisations = 4;  // without the poses that were far off the last time
 constexpr double kThin = 0.02;     // of how far the poses are away: within less of a line they turn the base anyhow
 constexpr double kJitter = 1e-6;   // of the instrument's variance: what is certain is so to rounding
+constexpr double kUnmoved = 0.1;   // of how far the poses are away: lost zeros move them no farther
+constexpr double kTurned = 0.002;  // rad: of a base that is turned as the model has it
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -79,14 +82,46 @@ Pose turned_by_orientations(const MeasurementBatch& batch, const std::vector<Err
   return make_pose(R_WB, measured_W - R_WB * predicted_B);
 }
 
-Result<Pose> base_of(const MeasurementBatch& batch, const std::vector<ErrorPrediction>& predictions,
-                     bool by_orientations) {
+/// Where the base stands if it is turned as in `X_WB`, by the mean of the positions; empty: it stands elsewhere.
+std::optional<Pose> turned_as_before(const MeasurementBatch& batch, const std::vector<ErrorPrediction>& predictions,
+                                     const Pose& X_WB) {
+  Vector3 shift_W = Vector3::Zero();
+  double away = 0;
+  const auto n = static_cast<double>(predictions.size());
+  for (std::size_t i = 0; i < predictions.size(); ++i) {
+    const Vector3& p_B = predictions[i].X_BT_predicted.translation();
+    shift_W += (batch.measurements[i].p_W - X_WB * p_B) / n;
+    away += p_B.norm() / n;
+  }
+  if (shift_W.norm() > kUnmoved * away) return std::nullopt;
+  return make_pose(X_WB.linear(), X_WB.translation() + shift_W);
+}
+
+struct Stand {
+  Pose X_WB;
+  bool turns = true;  ///< otherwise the base is turned as in the model
+};
+
+Result<Stand> base_of(const MeasurementBatch& batch, const std::vector<ErrorPrediction>& predictions,
+                      bool by_orientations, const Pose& X_WB_of_model) {
   constexpr std::size_t kFewest = 3;  // poses
-  if (predictions.size() < kFewest || !are_thin(predictions)) return located(batch, predictions);
-  if (by_orientations) return turned_by_orientations(batch, predictions);
+  if (predictions.size() < kFewest || !are_thin(predictions))
+    return located(batch, predictions).map([](const Pose& X_WB) { return Stand{X_WB}; });
+  if (by_orientations) return Stand{turned_by_orientations(batch, predictions)};
+  if (const auto X_WB = turned_as_before(batch, predictions, X_WB_of_model)) return Stand{*X_WB, false};
   return refused(
-      "all of them are at about one place or on one line, so that any error turns the base: measure poses "
-      "that are spread over the workspace (`trammel plan --check`)");
+      "all of them are at about one place or on one line, so that any error turns the base, and the instrument stands "
+      "elsewhere than in the model: measure poses that are spread over the workspace (`trammel plan --check`)");
+}
+
+/// The base is no more turned than by kTurned, about where the poses were measured.
+void hold_turn(CheckRows& rows) {
+  Eigen::MatrixXd by_turn(rows.residual.size(), 3);
+  for (std::size_t i = 0; i < rows.poses(); ++i)
+    by_turn.middleRows<3>(rows.first[i]) =
+        -skew(rows.predicted[i].translation() + rows.residual.segment<3>(rows.first[i]));
+  rows.covariance += kTurned * kTurned * by_turn * by_turn.transpose();
+  rows.by_base = Eigen::MatrixXd(rows.by_base.leftCols<3>());
 }
 
 /// Standard deviation of one axis of an orientation that the model shows on its own poses; 0: it knows none.
@@ -212,8 +247,9 @@ Result<CheckRows> check_rows(const CompensatedModel& model, const MeasurementBat
   const double shown = rotation_shown(parts);
   const bool has_orientation = std::any_of(batch.measurements.begin(), batch.measurements.end(),
                                            [&](const Measurement& m) { return m.R_WT && shown > 0; });
-  const Result<Pose> X_WB = base_of(batch, predictions, has_orientation);
-  if (!X_WB) return tl::make_unexpected(X_WB.error());
+  const Result<Stand> stand = base_of(batch, predictions, has_orientation, parts.physics.X_WB);
+  if (!stand) return tl::make_unexpected(stand.error());
+  const Pose& X_WB = stand->X_WB;
   Index next = 0;
   for (const Measurement& m : batch.measurements) {
     rows.pose_ids.push_back(m.pose_id);
@@ -236,14 +272,13 @@ Result<CheckRows> check_rows(const CompensatedModel& model, const MeasurementBat
     const PoseEffects at = effects.at(rows.contexts[i]);
     Eigen::MatrixXd J_W;
     static_cast<void>(parts.physics.pose_W(rows.contexts[i], parts.physics.values, &J_W));
-    rows.residual.segment<3>(first) = X_WB->inverse() * m.p_W - X_BT.translation();
+    rows.residual.segment<3>(first) = X_WB.inverse() * m.p_W - X_BT.translation();
     rows.by_base.middleRows(first, rows.count[i]) = at.by_base.topRows(rows.count[i]);
     rows.by_cause.middleRows(first, rows.count[i]) = at.by_cause.topRows(rows.count[i]);
     deviations.J.middleRows<3>(first) = R_BW * J_W.topRows<3>();
     add_position(predictions[i], m, tracker.sigma, parts.covariance, first, deviations);
     if (rows.count[i] == 3) continue;
-    rows.residual.segment<3>(first + 3) =
-        rotation_log(X_WB->linear().transpose() * *m.R_WT * X_BT.linear().transpose());
+    rows.residual.segment<3>(first + 3) = rotation_log(X_WB.linear().transpose() * *m.R_WT * X_BT.linear().transpose());
     deviations.J.middleRows<3>(first + 3) = R_BW * J_W.bottomRows<3>();
     add_rotation(tracker.sigma_rotation, shown, parts.covariance, first + 3, deviations);
   }
@@ -251,6 +286,7 @@ Result<CheckRows> check_rows(const CompensatedModel& model, const MeasurementBat
       covariance_of(rows, deviations, parts) + left_in_joints(rows, deviations, effects, parts.q_max - parts.q_min);
   const double factor = held_out_factor(rows, parts);
   rows.covariance *= factor * factor;
+  if (!stand->turns) hold_turn(rows);
   return rows;
 }
 

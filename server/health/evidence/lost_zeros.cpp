@@ -34,7 +34,7 @@ ZerosSearch::Linear ZerosSearch::linear(const VectorXd& at, const Pose& X_BB) co
   for (std::size_t i = 0; i < rows_.poses(); ++i) {
     const Index first = rows_.first[i], count = rows_.count[i];
     const PoseEffects there = effects_.at(rows_.contexts[i], at);
-    now.by_base.middleRows(first, count) = there.by_base.topRows(count);
+    now.by_base.middleRows(first, count) = there.by_base.topLeftCorner(count, now.by_base.cols());
     now.by_cause.middleRows(first, count) = there.by_cause.topRows(count);
     // The model's bias moves with the arm.
     const Pose& was = rows_.predicted[i];
@@ -66,12 +66,13 @@ ZerosFit ZerosSearch::begun(unsigned chosen, bool tool) const {
 
 void ZerosSearch::fit(ZerosFit& one) const {
   const auto k = static_cast<Index>(one.columns.size());
+  const Index b = rows_.by_base.cols();
   VectorXd precision(k);  // of the prior
   precision.setConstant(std::pow(kWidest, -2));
   precision.head(static_cast<Index>(one.zeros.size())).setConstant(std::pow(kWidestZero, -2));
   for (int step = 0; step < kMostSteps; ++step) {
     const Linear now = linear(one.at, one.X_BB);
-    MatrixXd J(now.residual.size(), 6 + k);
+    MatrixXd J(now.residual.size(), b + k);
     J << now.by_base, now.by_cause(Eigen::all, one.columns);
     J = factor_.matrixL().solve(J);
     const VectorXd residual = factor_.matrixL().solve(now.residual);
@@ -81,15 +82,17 @@ void ZerosSearch::fit(ZerosFit& one) const {
     gradient.tail(k) -= precision.cwiseProduct(VectorXd(one.at(one.columns)));
     const Eigen::LDLT<MatrixXd> solver(information);
     VectorXd by = solver.solve(gradient);
-    one.covariance = solver.solve(MatrixXd::Identity(6 + k, 6 + k)).bottomRightCorner(k, k);
-    double farthest = by.segment<3>(3).cwiseAbs().maxCoeff();
+    one.covariance = solver.solve(MatrixXd::Identity(b + k, b + k)).bottomRightCorner(k, k);
+    const Vector3 turn = rows_.base_turns() ? Vector3(by.segment<3>(3)) : Vector3::Zero();
+    double farthest = turn.cwiseAbs().maxCoeff();
     for (std::size_t z = 0; z < one.zeros.size(); ++z)
-      farthest = std::max(farthest, std::abs(by(6 + static_cast<Index>(z))) * effects_.scale(one.columns[z]));
+      farthest = std::max(farthest, std::abs(by(b + static_cast<Index>(z))) * effects_.scale(one.columns[z]));
     const bool is_settled = (J * by).squaredNorm() < kSettled;
     one.left = is_settled ? (residual - J * by).squaredNorm() : residual.squaredNorm();
-    by *= std::min(1.0, kFarthestTurn / std::max(farthest, kFarthestTurn));
-    one.X_BB = one.X_BB * make_pose(rotation_exp(by.segment<3>(3)), by.head<3>());
-    for (Index c = 0; c < k; ++c) one.at(one.columns[static_cast<std::size_t>(c)]) += by(6 + c);
+    const double part = std::min(1.0, kFarthestTurn / std::max(farthest, kFarthestTurn));
+    by *= part;
+    one.X_BB = one.X_BB * make_pose(rotation_exp(part * turn), by.head<3>());
+    for (Index c = 0; c < k; ++c) one.at(one.columns[static_cast<std::size_t>(c)]) += by(b + c);
     if (is_settled) return;
   }
 }
