@@ -35,18 +35,20 @@ using health::Sifted;
 using health::ZerosFit;
 using health::ZerosSearch;
 
-constexpr int kMostCauses = 3;         // that a check may name
-constexpr int kRounds = 3;             // of looking at each of them again beside the others
-constexpr double kAlike = 6;           // of scores: odds of e^3
-constexpr double kCredible = 0.99;     // of all single causes' odds: those that could be it have it together
-constexpr double kUnlinear = 0.003;    // of an effect
-constexpr double kDoubtful = 0.02;     // chance from which on nothing is said for certain
-constexpr double kNearlySeen = 10;     // times the limit: a cause that is named where the whole is beyond chance
-constexpr double kZeroGains = 10;      // beyond its price: a zero that is named beside others is so once in 5000
-constexpr double kMadeUpFor = 0.01;    // of an effect: so little left of it is not told from what makes up for it
-constexpr int kFewestChecks = 3;       // that say how fast an arm drifts
-constexpr double kExtrapolated = 10;   // times what the poses are off by: an effect that large is not seen in them
-constexpr double kFarOff = kNeverOff;  // m rms, base refitted: no small change, and effects are no longer linear
+constexpr int kMostCauses = 3;          // that a check may name
+constexpr int kRounds = 3;              // of looking at each of them again beside the others
+constexpr double kAlike = 6;            // of scores: odds of e^3
+constexpr double kCredible = 0.99;      // of all single causes' odds: those that could be it have it together
+constexpr double kUnlinear = 0.003;     // of an effect
+constexpr double kDoubtful = 0.02;      // chance from which on nothing is said for certain
+constexpr double kNearlySeen = 10;      // times the limit: a cause that is named where the whole is beyond chance
+constexpr double kZeroGains = 10;       // beyond its price: a zero that is named beside others is so once in 5000
+constexpr double kLeastRest = 1e-12;    // of residuals: less is rounding
+constexpr double kWorseInstrument = 5;  // times a healthy robot's residuals: an instrument may scatter so
+constexpr double kMadeUpFor = 0.01;     // of an effect: so little left of it is not told from what makes up for it
+constexpr int kFewestChecks = 3;        // that say how fast an arm drifts
+constexpr double kExtrapolated = 10;    // times what the poses are off by: an effect that large is not seen in them
+constexpr double kFarOff = kNeverOff;   // m rms, base refitted: no small change, and effects are no longer linear
 
 Eigen::MatrixXd joined(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other) {
   Eigen::MatrixXd both(one.rows(), one.cols() + other.cols());
@@ -112,6 +114,17 @@ void add_rival(const SingleCause& rival, SeenChange& change) {
   if (!known && !same(change.cause)) change.could_also_be.push_back(rival);
 }
 
+/// An instrument that tells all lengths too long is like an arm that grew.
+void tell_instrument(SeenChange& change) {
+  for (const CauseRecord* record : all_causes()) {
+    const bool is_rival = std::any_of(record->rivals.begin(), record->rivals.end(), [&](const causes::Rival& rival) {
+      return rival.cause == change.cause.record->spelling;
+    });
+    if (is_rival && record->scope == causes::Scope::kSession && !record->needs.time)
+      add_rival({record, -1, {}, false}, change);
+  }
+}
+
 std::string rival_in_words(const SingleCause& cause) {
   return is_zero(cause) && cause.joint < 0 ? "lost zeros in several joints" : in_words(cause);
 }
@@ -149,6 +162,9 @@ class Examination {
     tell_smallest(tests);
     tell_due(tests.rows(), times);
     tell_verdict();
+    if (!rows_.base_turns())
+      check_.sentence +=
+          "; poses at one place do not say which way the base is turned: it is taken to be turned as in the model";
     return std::move(check_);
   }
 
@@ -190,8 +206,8 @@ class Examination {
   /// Adds the causes that explain as much as this one does beside `others`.
   void tell_rivals_beside(const CheckRows& there, const Eigen::MatrixXd& others, std::size_t cause,
                           SeenChange& change) const;
-  /// Several zeros that explain as much as what was named does.
-  void tell_several_zeros(double left, SeenChange& change) const;
+  /// Several zeros that explain as much as what was named does, with so many `numbers`.
+  void tell_several_zeros(double left, int numbers, SeenChange& change) const;
   void look_for_changes(const CheckTests& healthy);
   void tell_what_is_left();
   /// m rms of the positions, refitted.
@@ -223,6 +239,8 @@ class Examination {
   void tell_rivals(std::size_t hypothesis, const CheckTests& tests, const std::vector<double>& scores,
                    SeenChange& change) const;
   [[nodiscard]] std::vector<bool> credible(const std::vector<double>& scores) const;
+  /// True where all residuals being larger alike explains as much as the best of all causes does.
+  [[nodiscard]] bool is_scatter(std::size_t hypothesis, const CheckTests& tests, const Eigen::VectorXd& left) const;
   void unknown_found(double chance, const Eigen::VectorXd& left, int freedom);
   void tell_rms(const RefittedRows& refitted);
   void tell_due(const RefittedRows& refitted, const CheckTimes& times);
@@ -250,6 +268,7 @@ class Examination {
   double off_ = 0;           // m rms of the positions
   bool is_far_ = false;      // only a tool that sits elsewhere is named
   bool is_too_far_ = false;  // nothing is
+  double scatter_ = 0;       // times a healthy robot's residuals, where nothing explains them better than noise
   HealthCheck check_;
 };
 
@@ -290,14 +309,16 @@ void Examination::look_for_changes(const CheckTests& healthy) {
 void Examination::tell_what_is_left() {
   const CheckTests tests(covariance_, nuisance_, questions_);
   const bool is_all = tests.smallest_p(tests.rows().left(rows_.residual)) >= healthy_.limit(options_.false_alarm);
-  const double left = RefittedRows(rows_.covariance, nuisance_).left(rows_.residual).squaredNorm();
+  const RefittedRows named(rows_.covariance, nuisance_);
+  const double left = named.left(rows_.residual).squaredNorm();
+  const int numbers = RefittedRows(rows_.covariance, always_).freedom() - named.freedom();
   for (SeenChange& change : check_.changed) {
-    tell_several_zeros(left, change);
+    tell_several_zeros(left, numbers, change);
     if (!is_all) add_rival(unknown_cause(), change);
   }
 }
 
-void Examination::tell_several_zeros(double left, SeenChange& change) const {
+void Examination::tell_several_zeros(double left, int numbers, SeenChange& change) const {
   const auto is_in = [&](const Named& named, const ZerosFit& fit) {
     const std::size_t cause = questions_.hypotheses[named.hypothesis].cause;
     if (is_tool(named.hypothesis)) return fit.tool;
@@ -306,7 +327,8 @@ void Examination::tell_several_zeros(double left, SeenChange& change) const {
   for (const ZerosFit& fit : fits_) {
     const bool is_more_of_it =
         std::all_of(named_.begin(), named_.end(), [&](const Named& named) { return is_in(named, fit); });
-    if (fit.zeros.empty() || is_more_of_it || fit.left > left + kAlike) continue;
+    const bool is_likelier = fit.left + price(fit.numbers) < left + price(numbers);
+    if (fit.zeros.empty() || (is_more_of_it ? !is_likelier : fit.left > left + kAlike)) continue;
     SingleCause zeros = effects_.causes()[fit.zeros.front()].cause;
     if (fit.zeros.size() > 1) zeros.joint = -1;
     add_rival(zeros, change);
@@ -457,13 +479,18 @@ bool Examination::look_once(const CheckTests& tests) {
     return false;
   }
   const auto is_seen = [&](std::size_t cause) { return tests.p_value(cause, left) < kNearlySeen * limit; };
-  const bool fits = best && is_seen(*best);
+  const bool fits = best && is_seen(*best) && !is_scatter(*best, tests, left);
   if (fits) {
     named_.push_back({*best, chance});
     refit_named();
-  } else if (named_.empty() &&
-             (tests.whole_p(left) < limit || (questions_.causes > 0 && is_seen(most_explained(tests, left))))) {
-    unknown_found(chance, left, tests.rows().freedom());
+  } else if (named_.empty() && questions_.causes > 0) {
+    const std::size_t most = most_explained(tests, left);
+    const double scatter = std::sqrt(left.squaredNorm() / tests.rows().freedom());
+    if (is_scatter(most, tests, left) && scatter < kWorseInstrument) {
+      scatter_ = scatter;
+    } else if (tests.whole_p(left) < limit || is_seen(most)) {
+      unknown_found(chance, left, tests.rows().freedom());
+    }
   }
   return fits;
 }
@@ -486,6 +513,13 @@ std::optional<std::size_t> Examination::likeliest(const CheckTests& tests, const
     *best = 0;
   }
   return std::nullopt;
+}
+
+bool Examination::is_scatter(std::size_t hypothesis, const CheckTests& tests, const Eigen::VectorXd& left) const {
+  const double whole = left.squaredNorm();
+  const double rest = whole - (tests.directions()[hypothesis].transpose() * left).squaredNorm();
+  const double gained = tests.rows().freedom() * std::log(whole / std::max(rest, kLeastRest * whole));
+  return gained < price(tests.freedom(hypothesis)) + 2 * std::log(static_cast<double>(questions_.causes));
 }
 
 /// A cause of any form fits nearly anything in part, so it is named only where nothing is left.
@@ -626,6 +660,7 @@ void Examination::tell_rivals(std::size_t hypothesis, const CheckTests& tests, c
     const bool as_much = !other.any_function && explained(h) > explained(hypothesis) - kAlike;
     if (h != hypothesis && (as_much || likely[h] || scores[h] > scores[hypothesis] - kAlike)) add_rival(other, change);
   }
+  if (change.cause.record->needs.temperature) tell_instrument(change);
   if (!change.cause.any_function) return;
   for (const causes::Rival& rival : change.cause.record->rivals) {
     const CauseRecord* record = find_cause(rival.cause);
@@ -796,6 +831,12 @@ void Examination::tell_verdict() {
     });
     if (!is_sure)
       check_.sentence += fmt::format("; `trammel plan --check {}` chooses poses that tell more", 2 * check_.poses);
+  } else if (scatter_ > 0) {
+    check_.sentence = fmt::format(
+        "the poses are off by {:.1f} times as much as a healthy robot's, and no change explains that better than noise "
+        "does: the instrument measured worse than its sigma says, or several things changed; measure again, or more "
+        "poses (`trammel plan --check {}`)",
+        scatter_, 2 * check_.poses);
   } else if (check_.p_value < kDoubtful) {
     check_.sentence = fmt::format(
         "these poses are less like the model than {:.1f} % of healthy checks are, which may be chance: measure again",
@@ -832,6 +873,37 @@ HealthCheck too_few(const MeasurementBatch& batch, const HealthOptions& options,
   return check;
 }
 
+/// True where lost zeros are named, and leave nothing beyond chance.
+bool is_all_by_zeros(const HealthCheck& check) {
+  const auto leaves_nothing = [](const SeenChange& change) {
+    const auto& others = change.could_also_be;
+    return std::none_of(others.begin(), others.end(),
+                        [](const SingleCause& other) { return same_cause(other, unknown_cause()); });
+  };
+  return !check.changed.empty() && !check.changed.front().zeros.empty() &&
+         std::all_of(check.changed.begin(), check.changed.end(), leaves_nothing);
+}
+
+Result<HealthCheck> looked_through(const CompensatedModel& model, const CheckedBatch& batch,
+                                   const HealthOptions& options) {
+  const MeasurementBatch known = known_rows(model, batch.rows());
+  if (known.measurements.empty()) {
+    return refused("no pose has a tool and payload that model {} was trained with", model.provenance().id)
+        .in("batch " + batch.id());
+  }
+  const std::vector<PoseContext> contexts = health::contexts_of(model, known);
+  const CauseEffects effects(model.parts().physics, contexts, model.parts().temperature_mean);
+  const WorkingPoses working(effects, health::working_poses(model, contexts.front(), options.seed), options.new_tool);
+  Result<CheckRows> rows = health::check_rows(model, known, effects);
+  if (!rows) return too_few(known, options, "these poses do not say where the base stands: " + rows.error().message);
+  const ErrorFigures& shown = model.parts().training.compensated;
+  const int tails = health::tail_freedom_of(shown.rms > 0 ? shown.p997 / shown.rms : 0, model.parts().training.poses);
+  HealthCheck check = Examination(options, effects, working, std::move(*rows), tails, model.cell().robot)
+                          .result({model.provenance().measured_at, batch.rows().measured_at});
+  check.model = model.provenance().id;
+  return check;
+}
+
 }  // namespace
 
 std::string_view to_string(HealthVerdict verdict) {
@@ -856,23 +928,10 @@ Result<HealthCheck> check_health(const CompensatedModel& model, const CheckedBat
         .of("session_id")
         .next("check each session by itself");
   }
+  Result<HealthCheck> check = looked_through(model, batch, options);
+  if (check && is_all_by_zeros(*check)) return check;
   if (std::optional<Error> doubt = reading_doubt(batch.rows(), model.cell()))
     return tl::make_unexpected(std::move(*doubt));
-  const MeasurementBatch known = known_rows(model, batch.rows());
-  if (known.measurements.empty()) {
-    return refused("no pose has a tool and payload that model {} was trained with", model.provenance().id)
-        .in("batch " + batch.id());
-  }
-  const std::vector<PoseContext> contexts = health::contexts_of(model, known);
-  const CauseEffects effects(model.parts().physics, contexts, model.parts().temperature_mean);
-  const WorkingPoses working(effects, health::working_poses(model, contexts.front(), options.seed), options.new_tool);
-  Result<CheckRows> rows = health::check_rows(model, known, effects);
-  if (!rows) return too_few(known, options, "these poses do not say where the base stands: " + rows.error().message);
-  const ErrorFigures& shown = model.parts().training.compensated;
-  const int tails = health::tail_freedom_of(shown.rms > 0 ? shown.p997 / shown.rms : 0, model.parts().training.poses);
-  HealthCheck check = Examination(options, effects, working, std::move(*rows), tails, model.cell().robot)
-                          .result({model.provenance().measured_at, batch.rows().measured_at});
-  check.model = model.provenance().id;
   return check;
 }
 

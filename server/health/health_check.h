@@ -75,8 +75,9 @@ struct HealthCheck {
 
 /// Holds `batch` against `model`. The tracker may stand anywhere: the base is found anew. Poses whose tool or payload
 /// the model was not trained with do not count; a batch that has no other is refused.
-/// So is one of several set-ups, and one that was not read as it was meant (reading_doubt()). Where the poses are off
-/// by more than 5 mm only lost zeros and a tool that sits elsewhere are named; else nothing can be told.
+/// So is one of several set-ups, and one that was not read as it was meant (reading_doubt()), unless lost zeros explain
+/// all of its poses. Where the poses are off by more than 5 mm only lost zeros and a tool that sits elsewhere are
+/// named; else nothing can be told.
 ///
 /// The residuals of all poses are r = B b (+ T t) + J theta + e with e ~ N(0, S): S has the measurement's noise, what
 /// the parameters leave uncertain, and what the model leaves over, which poses near each other share; it is scaled so

@@ -49,6 +49,8 @@ bool carries(const Cell& cell, const std::vector<PoseContext>& poses) {
 
 constexpr std::size_t kMostNumbers = 6;  // of one cause: what needs more is not seen by few poses
 constexpr double kWarmer = 2;            // K between poses, from which on temperature shows
+constexpr double kUnrecorded = 10;       // K: so much warmer may an arm be where no temperature says it
+constexpr double kOfDrawings = 20;       // degrees Celsius
 
 bool warms(const std::vector<PoseContext>& poses, std::optional<double> learned_at) {
   std::optional<double> low = learned_at, high = learned_at;
@@ -60,6 +62,11 @@ bool warms(const std::vector<PoseContext>& poses, std::optional<double> learned_
   return low && *high - *low > kWarmer;
 }
 
+/// True where a temperature that is the same at all poses shows: all lengths are another.
+bool shows_alike_at_all(const CauseRecord& record) {
+  return record.scope == Scope::kArm && record.needs.temperature && !record.needs.history;
+}
+
 /// What these poses would have to record; empty where the cause shows.
 std::string lacking(const CauseRecord& record, int joint, const Cell& cell, const std::vector<PoseContext>& poses,
                     std::optional<double> learned_at) {
@@ -67,7 +74,7 @@ std::string lacking(const CauseRecord& record, int joint, const Cell& cell, cons
   if (needs.payload && !carries(cell, poses)) return "a payload";
   if (needs.direction && joint >= 0 && !(approached(poses, joint, 1) && approached(poses, joint, -1)))
     return "approaching the poses from both sides of this joint";
-  if (needs.temperature && !warms(poses, learned_at))
+  if (needs.temperature && !shows_alike_at_all(record) && !warms(poses, learned_at))
     return "temperatures that differ between the poses, or from those of the training";
   if (needs.velocity || needs.time) return "a continuous path with times";
   if (needs.before || needs.history) return "a batch of many poses with their times";
@@ -106,7 +113,7 @@ bool same_cause(const SingleCause& one, const SingleCause& other) {
 }
 
 CauseEffects::CauseEffects(PhysicalModel model, const std::vector<PoseContext>& poses, std::optional<double> learned_at)
-    : model_(std::move(model)), learned_at_(learned_at) {
+    : model_(std::move(model)), learned_at_(learned_at), is_warmth_recorded_(warms(poses, learned_at)) {
   const Chain& robot = model_.cell->robot;
   for (const CauseRecord* record : all_causes()) {
     if (!may_have_changed(*record)) continue;
@@ -211,11 +218,17 @@ PoseEffects CauseEffects::at(const PoseContext& context, const Eigen::VectorXd& 
   }
   Pose X_WT = Pose::Identity();
   Eigen::MatrixXd jacobian = jacobian_at(context, values, &X_WT);
-  if (learned_at_ && !warm_.empty()) {
+  if (!warm_.empty() && (learned_at_ || !is_warmth_recorded_)) {
     PoseContext learned = context;
-    learned.temperature = learned_at_;
+    learned.temperature = learned_at_.value_or(kOfDrawings);
+    PoseContext warmer = learned;
+    *warmer.temperature += kUnrecorded;
     Pose unused = Pose::Identity();
-    jacobian(Eigen::all, warm_) -= jacobian_at(learned, values, &unused)(Eigen::all, warm_);
+    const auto by_warmth = [&](const PoseContext& c) {
+      return jacobian_at(c, values, &unused)(Eigen::all, warm_).eval();
+    };
+    if (!is_warmth_recorded_) jacobian(Eigen::all, warm_) = by_warmth(warmer);
+    jacobian(Eigen::all, warm_) -= by_warmth(learned);
   }
   const Matrix3 R_BW = model_.X_WB.linear().transpose();
   PoseEffects effects;

@@ -45,7 +45,8 @@ class CauseEffects {
   };
   /// The causes that `poses` could show by what was recorded with them: others are listed as not asked. `learned_at`,
   /// degrees Celsius: where the model knows the arm's lengths; heat shows by the difference. Empty: by differences
-  /// between the poses alone.
+  /// between the poses alone. Where these are none, an arm that grew as a whole is asked for all the same: nobody may
+  /// have recorded how warm it is.
   CauseEffects(PhysicalModel model, const std::vector<PoseContext>& poses, std::optional<double> learned_at = {});
 
   [[nodiscard]] const std::vector<Entry>& causes() const { return causes_; }
@@ -78,6 +79,7 @@ class CauseEffects {
 
   PhysicalModel model_;
   std::optional<double> learned_at_;
+  bool is_warmth_recorded_ = false;
   std::vector<Entry> causes_;
   std::vector<CauseNotAsked> not_asked_;
   std::vector<Number> numbers_;      // of each column

@@ -307,6 +307,50 @@ TEST_F(HealthTest, PosesAtOnePlaceWithoutOrientationsCannotTell) {
   EXPECT_NE(check->sentence.find("spread"), std::string::npos) << check->sentence;
 }
 
+TEST_F(HealthTest, WhereTwoZerosExplainMoreThanOneTheCheckIsNotSureOfOneAlone) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const HealthCheck check =
+        checked(*robot_, {{zero_off(*robot_, 2, 4e-5), zero_off(*robot_, 3, -4e-5)}}, seed, tolerance_mm(0.05));
+    if (!test::is_sure(check) || check.changed.front().zeros.size() != 1) continue;
+    const LostZero& zero = check.changed.front().zeros.front();
+    EXPECT_LE(std::abs(zero.by - (zero.joint == 1 ? 4e-5 : -4e-5)), 1.5 * zero.u95) << check.sentence;
+  }
+}
+
+TEST_F(HealthTest, AnInstrumentThatMeasuresWorseThanItsSigmaSaysIsNoChangeOfTheRobot) {
+  const Cell& cell = robot_->model.cell();
+  hidden::Random random(13);
+  std::normal_distribution<double> normal;
+  int changed = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    MeasurementBatch batch = test::measured_check(*robot_, {}, seed);
+    for (Measurement& m : batch.measurements) {
+      m.p_W += 25e-6 * Vector3(normal(random), normal(random), normal(random));  // twice the stated sigma in all
+      m.R_WT.reset();
+    }
+    const HealthCheck check =
+        check_health(robot_->model, check_against_cell(batch, cell).value(), tolerance_mm(0.05)).value();
+    changed += check.verdict == HealthVerdict::kChanged ? 1 : 0;
+  }
+  EXPECT_LE(changed, 3);
+}
+
+TEST_F(HealthTest, LengthsThatAreAllTooLongAreAWarmArmOrTheInstrumentAndNoLink) {
+  const Cell& cell = robot_->model.cell();
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    MeasurementBatch batch = test::measured_check(*robot_, {}, seed);
+    for (Measurement& m : batch.measurements) m.p_W *= 1 + 2e-4;
+    const HealthCheck check =
+        check_health(robot_->model, check_against_cell(batch, cell).value(), tolerance_mm(0.05)).value();
+    ASSERT_EQ(check.changed.size(), 1u) << check.sentence;
+    const SeenChange& change = check.changed.front();
+    EXPECT_EQ(change.cause.record->spelling, "thermal_growth") << check.sentence;
+    EXPECT_TRUE(std::any_of(change.could_also_be.begin(), change.could_also_be.end(), [](const SingleCause& other) {
+      return other.record->spelling == "instrument_scale";
+    })) << check.sentence;
+  }
+}
+
 TEST_F(HealthTest, NoCauseIsSaidToDoFarMoreThanThePosesAreOff) {
   const Cell& cell = robot_->model.cell();
   hidden::Random random(11);
