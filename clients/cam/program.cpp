@@ -14,20 +14,13 @@ namespace trammel::cam {
 
 namespace {
 
-/// deg about Z, new Y, new X.
-Eigen::Vector3d zyx_angles(const Matrix3& R) {
-  const double b = std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0)));
-  if (std::hypot(R(0, 0), R(1, 0)) < 1e-9) return {0, to_deg(b), to_deg(std::atan2(-R(1, 2), R(1, 1)))};
-  return {to_deg(std::atan2(R(1, 0), R(0, 0))), to_deg(b), to_deg(std::atan2(R(2, 1), R(2, 2)))};
-}
-
 double near_turn(double angle, double like) { return angle + 360 * std::round((like - angle) / 360); }
 
 /// Of the two ways to write a rotation the one nearer to `like`. Where the middle angle is ±90 deg only a sum of the
 /// others is given: the first stays.
 Eigen::Vector3d nearest_zyx(const Matrix3& R, const Eigen::Vector3d& like) {
-  Eigen::Vector3d one = zyx_angles(R);
-  if (std::hypot(R(0, 0), R(1, 0)) < 1e-9) {
+  Eigen::Vector3d one = to_deg(1.0) * zyx_angles(R);
+  if (is_beta_upright(R)) {
     one(0) = like(0);
     one(2) = to_deg(R(2, 0) < 0 ? std::atan2(R(0, 1), R(1, 1)) : std::atan2(-R(0, 1), R(1, 1)));
     one(2) += R(2, 0) < 0 ? like(0) : -like(0);
@@ -41,9 +34,7 @@ Eigen::Vector3d nearest_zyx(const Matrix3& R, const Eigen::Vector3d& like) {
 }
 
 Matrix3 rotation_zyx(double z, double y, double x) {
-  return (Eigen::AngleAxisd(from_deg(z), Vector3::UnitZ()) * Eigen::AngleAxisd(from_deg(y), Vector3::UnitY()) *
-          Eigen::AngleAxisd(from_deg(x), Vector3::UnitX()))
-      .toRotationMatrix();
+  return pose_zyx(Vector3::Zero(), from_deg(z), from_deg(y), from_deg(x)).linear();
 }
 
 Vector3 vector_of(const std::vector<double>& numbers, std::size_t first) {

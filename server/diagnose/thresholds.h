@@ -100,10 +100,6 @@ inline constexpr double kAtOnce = 0.05;
 /// rad that no joint exceeds from pose to pose along a path that was measured in motion.
 inline constexpr double kPathStep = 0.2;
 
-/// m: positions of a tool that all lie in so small a box were measured at one point. An arm that is off its drawing by
-/// as much as arms are moves its tool by less.
-inline constexpr double kOnePoint = 0.02;
-
 // Doubting: what makes a finding unsure once everything was found.
 
 /// Share of the range of all other poses by which a pose must lie beyond them in a joint to stand at the edge.

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "server/base/units.h"
+#include "server/measurement/one_place.h"
 #include "server/measurement/pose_columns.h"
 #include "server/measurement/reading/arm_fit.h"
 #include "server/measurement/reading/catalogue.h"
@@ -16,7 +17,6 @@ namespace {
 using reading::ArmFit;
 using reading::NumberTable;
 using reading::Reading;
-using reading::spread;
 
 constexpr std::size_t kFewestPoses = 6;
 constexpr std::size_t kRowsLocated = 80, kRowsFitted = 200;  // evenly drawn beyond
@@ -25,7 +25,6 @@ constexpr std::size_t kMostFitted = 16;  // readings that are tried with all of 
 constexpr double kWorthAsking = 1e-3;  // below it no reading is tried: what a model of a robot leaves
 constexpr double kOfRows = 5e-3;       // the same for rows: on a path, a late clock looks like the next row
 constexpr double kMuchBetter = 0.25;   // of the distance as given: a reading that was surely meant
-constexpr double kOnePlace = 50e-3;    // spread: positions nearer together hardly tell how the base is turned
 constexpr double kAsGood = 1.5;        // times the best: a reading that cannot be told from it
 constexpr double kFollow = 20e-3;      // what fits within it can be asked for single rows, zeros and tools
 constexpr double kBadRow = 10e-3;      // and 8 times the median: a row of other joints
@@ -84,7 +83,7 @@ class Look {
     if (table_.size() < kFewestPoses) return;
     const NumberTable some = thinned(table_, kRowsFitted);
     given_ = fitted(some, cell_, located(thinned(table_, kRowsLocated), cell_));
-    if (given_->quality > kWorthAsking && spread(table_) < kOnePlace)
+    if (given_->quality > kWorthAsking && are_at_one_place(table_.p_W))
       given_ = fitted_from_all_sides(some, cell_, *given_);
   }
 
@@ -156,9 +155,9 @@ void Look::search() {
 
 /// A reading that shrinks the positions shrinks what is left of them, too: it must fit better beside their spread.
 bool Look::is_much_better(const Tried& tried) const {
-  const double as_given = spread(table_);
+  const double as_given = spread_of(table_.p_W);
   return tried.fit.quality < kFollow &&
-         tried.fit.quality * as_given < kMuchBetter * given_->quality * std::min(as_given, spread(tried.table));
+         tried.fit.quality * as_given < kMuchBetter * given_->quality * std::min(as_given, spread_of(tried.table.p_W));
 }
 
 /// Of readings that fit the positions as well, orientations decide, then where the base stands, then the catalogue.

@@ -47,6 +47,14 @@ Pose pose_zyx(const Vector3& translation, double gamma, double beta, double alph
   return make_pose(R, translation);
 }
 
+bool is_beta_upright(const Matrix3& R) { return std::hypot(R(0, 0), R(1, 0)) < 1e-9; }
+
+Vector3 zyx_angles(const Matrix3& R) {
+  const double beta = std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0)));
+  if (is_beta_upright(R)) return {0, beta, std::atan2(-R(1, 2), R(1, 1))};
+  return {std::atan2(R(1, 0), R(0, 0)), beta, std::atan2(R(2, 1), R(2, 2))};
+}
+
 Vector6 pose_difference(const Pose& measured, const Pose& model) {
   Vector6 difference;
   difference.head<3>() = measured.translation() - model.translation();

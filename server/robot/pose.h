@@ -22,6 +22,10 @@ using JointVector = Eigen::VectorXd;
 [[nodiscard]] Matrix3 left_jacobian(const Vector3& w);
 /// Tx Ty Tz Rz(gamma) Ry(beta) Rx(alpha), the base transformation of the source, eq. (3.5).
 [[nodiscard]] Pose pose_zyx(const Vector3& translation, double gamma, double beta, double alpha);
+/// Its gamma, beta, alpha of R, beta at most 90 degrees. There gamma and alpha turn about one axis, and gamma is 0.
+[[nodiscard]] Vector3 zyx_angles(const Matrix3& R);
+/// Whether beta is 90 degrees up or down.
+[[nodiscard]] bool is_beta_upright(const Matrix3& R);
 [[nodiscard]] Pose make_pose(const Matrix3& R, const Vector3& p);
 /// measured - model: [p_measured - p_model; rotation_log(R_measured R_modelᵀ)], in the frame of both poses.
 [[nodiscard]] Vector6 pose_difference(const Pose& measured, const Pose& model);

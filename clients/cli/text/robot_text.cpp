@@ -31,18 +31,11 @@ std::string xml_comment(std::string text) {
   return text;
 }
 
-/// Roll, pitch, yaw about fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll).
-Vector3 roll_pitch_yaw(const Matrix3& R) {
-  const double pitch = std::atan2(-R(2, 0), std::hypot(R(0, 0), R(1, 0)));
-  if (std::hypot(R(0, 0), R(1, 0)) > 1e-9) return {std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0))};
-  return {std::atan2(-R(1, 2), R(1, 1)), pitch, 0};  // straight up or down: roll and yaw turn about one axis
-}
-
 std::string origin(const Pose& X) {
   const Vector3 p = X.translation() + Vector3::Zero();  // no -0
-  const Vector3 angles = roll_pitch_yaw(X.linear()) + Vector3::Zero();
+  const Vector3 yaw_pitch_roll = zyx_angles(X.linear()) + Vector3::Zero();
   return fmt::format("<origin xyz=\"{:.15g} {:.15g} {:.15g}\" rpy=\"{:.15g} {:.15g} {:.15g}\"/>", p.x(), p.y(), p.z(),
-                     angles.x(), angles.y(), angles.z());
+                     yaw_pitch_roll.z(), yaw_pitch_roll.y(), yaw_pitch_roll.x());
 }
 
 std::string joint(const std::string& name, const std::string& type, const std::string& parent, const std::string& child,

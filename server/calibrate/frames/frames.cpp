@@ -7,6 +7,7 @@
 #include "server/base/units.h"
 #include "server/calibrate/frames/localisation.h"
 #include "server/measurement/gauges.h"
+#include "server/measurement/one_place.h"
 #include "server/robot/cube_turns.h"
 #include "server/robot/rigid_fit.h"
 
@@ -15,7 +16,6 @@ namespace trammel {
 namespace {
 
 constexpr double kClearlyBetter = 0.5;  // of the misfit
-constexpr double kOnePlace = 50e-3;     // m, spread of positions: an arm that is off by 3 mm is a turn of 3 deg there
 constexpr double kTurnUntold = 0.2;     // of the spread of the nominal points: a turn that follows what does not fit
 
 }  // namespace
@@ -154,13 +154,8 @@ Status locate_unknown_frames(PhysicalModel& model, const MeasurementBatch& batch
 }
 
 Vector6 motion_values(const Pose& X) {
-  const Vector3 zyx = X.linear().eulerAngles(2, 1, 0);
-  const bool flipped = std::abs(zyx(1)) > kPi / 2;  // the other triple of the same rotation
   Vector6 values;
-  values.head<3>() = X.translation();
-  values.tail<3>() = flipped ? Vector3(zyx(0) - std::copysign(kPi, zyx(0)), std::copysign(kPi, zyx(1)) - zyx(1),
-                                       zyx(2) - std::copysign(kPi, zyx(2)))
-                             : zyx;
+  values << X.translation(), zyx_angles(X.linear());
   return values;
 }
 
@@ -174,13 +169,6 @@ Eigen::Matrix3Xd measured_points(const MeasurementBatch& batch) {
   for (Eigen::Index i = 0; i < p_W.cols(); ++i) p_W.col(i) = placed.measurements[static_cast<std::size_t>(i)].p_W;
   return p_W;
 }
-
-/// m, rms distance of the points from their centroid.
-double spread_of(const Eigen::Matrix3Xd& points) {
-  return beside_centroid(points).norm() / std::sqrt(static_cast<double>(points.cols()));
-}
-
-bool are_at_one_place(const Eigen::Matrix3Xd& points) { return points.cols() > 0 && spread_of(points) < kOnePlace; }
 
 /// The motion that takes `nominal` onto `measured`; a shift where what does not fit is as large as the points' spread.
 Result<Pose> motion_between(const Eigen::Matrix3Xd& measured, const Eigen::Matrix3Xd& nominal) {

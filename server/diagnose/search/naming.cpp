@@ -1,11 +1,11 @@
 #include "server/diagnose/search/naming.h"
 
 #include <algorithm>
-#include <map>
 #include <string>
 
 #include "server/diagnose/families/candidates.h"
 #include "server/diagnose/thresholds.h"
+#include "server/measurement/one_place.h"
 
 namespace trammel::cause_search {
 
@@ -84,20 +84,6 @@ bool is_doubtful_case(const Cause& general, const Cause& special) {
   return has_rival(general, special, {Likeness::kDoubtfulCase}, false);
 }
 
-bool sees_one_point(const MeasurementBatch& batch) {
-  struct Box {
-    Vector3 low, high;
-  };
-  std::map<std::string, Box> boxes;
-  for (const Measurement& m : batch.measurements) {
-    const auto box = boxes.try_emplace(m.context.tool, Box{m.p_W, m.p_W}).first;
-    box->second.low = box->second.low.cwiseMin(m.p_W);
-    box->second.high = box->second.high.cwiseMax(m.p_W);
-  }
-  return std::all_of(boxes.begin(), boxes.end(),
-                     [](const auto& box) { return (box.second.high - box.second.low).norm() < thresholds::kOnePoint; });
-}
-
 namespace {
 
 /// Where links are off and the tool stays where it is, base and tool make up for each other, and links for both.
@@ -122,7 +108,7 @@ std::vector<Cause> untestable_rivals(const Cause& cause, const MeasurementBatch&
     return (needs.time && !times) || (needs.temperature && !temperatures);
   };
   const CauseRecord& own = record_of(cause);
-  std::vector<Cause> rivals = sees_one_point(batch) ? rivals_at_one_point(cause) : std::vector<Cause>();
+  std::vector<Cause> rivals = is_each_tool_at_one_place(batch) ? rivals_at_one_point(cause) : std::vector<Cause>();
   for (const CauseRecord* other : all_causes()) {
     if (own.goes_with_time && other->goes_with_time && other != &own && lacks(other->needs))
       rivals.push_back(cause_at(*other));

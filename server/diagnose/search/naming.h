@@ -27,9 +27,6 @@ struct Naming {
   std::vector<Cause> could_also_be;  ///< explain the data as well
 };
 
-/// Whether every tool was measured at one place only, turned about it: as tools are that turn on a tip, or in a cup.
-[[nodiscard]] bool sees_one_point(const MeasurementBatch& batch);
-
 /// Causes that would look like `cause`, and for which the batch records nothing that could rule them out.
 [[nodiscard]] std::vector<Cause> untestable_rivals(const Cause& cause, const MeasurementBatch& batch);
 

@@ -18,6 +18,7 @@
 #include "server/diagnose/tell/slow_change.h"
 #include "server/diagnose/tell/wording.h"
 #include "server/diagnose/thresholds.h"
+#include "server/measurement/one_place.h"
 
 namespace trammel::cause_search {
 
@@ -309,7 +310,7 @@ void tell_limits(const Explained& explained, const PreparedBatch& prepared, cons
     limits.emplace_back(
         "the rows are not in the order of their times: they were put into it, and what begins at a pose is not "
         "applied");
-  if (sees_one_point(recorded))
+  if (is_each_tool_at_one_place(recorded))
     limits.emplace_back(
         "every tool was measured at one point: base, tool and the zeros of the last three joints cannot be told apart "
         "there; measure poses all over the workspace");

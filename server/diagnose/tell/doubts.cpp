@@ -6,6 +6,7 @@
 #include "server/diagnose/search/naming.h"
 #include "server/diagnose/tell/wording.h"
 #include "server/diagnose/thresholds.h"
+#include "server/measurement/one_place.h"
 
 namespace trammel::cause_search {
 
@@ -139,7 +140,7 @@ struct Doubts {
         by_scale(may_be_scale(cause, beside)),
         not_held_out(!evidence.helps_held_out),
         by_half(beside.more_than_noise && !evidence.in_both_halves),
-        at_one_point(record_of(cause).part == causes::Part::kLinks && sees_one_point(beside.recorded)),
+        at_one_point(record_of(cause).part == causes::Part::kLinks && is_each_tool_at_one_place(beside.recorded)),
         many(descriptions_of_many(cause, beside.found)) {
     std::erase_if(many, [&](const Cause& general) { return contains(rivals, general); });
   }

@@ -53,11 +53,6 @@ NumberTable thinned(const NumberTable& table, std::size_t most) {
   return matched(table, rows, rows);
 }
 
-double spread(const NumberTable& table) {
-  const Eigen::Matrix3Xd beside = table.p_W.colwise() - table.p_W.rowwise().mean();
-  return beside.norm() / std::sqrt(static_cast<double>(table.size()));
-}
-
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());

@@ -30,9 +30,6 @@ struct NumberTable {
 /// whatever order the tools take turns.
 [[nodiscard]] NumberTable thinned(const NumberTable& table, std::size_t most);
 
-/// m, rms distance of the positions from their centroid.
-[[nodiscard]] double spread(const NumberTable& table);
-
 /// The middle one; of an even number the upper of the two. `values` is not empty.
 [[nodiscard]] double median(std::vector<double> values);
 
