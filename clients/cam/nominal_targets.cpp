@@ -292,22 +292,9 @@ std::vector<double> in_degrees(Coordinates coordinates, std::vector<double> axes
   return axes;
 }
 
-namespace {
-
-/// Readers count lines by LF, and comments end with it.
-Status check_line_ends(const Program& program) {
-  for (const SourceFile& file : program.files) {
-    if (file.text.find('\r') == std::string::npos || file.text.find('\n') != std::string::npos) continue;
-    return refused("its lines end in CR alone").in(file.name).next("save it with line ends LF or CR LF");
-  }
-  return {};
-}
-
-}  // namespace
-
 Result<NominalTargets> nominal_targets(const Program& program, const ArmOfProgram& arm, const CellTools& cell,
                                        const std::string& tool, const std::string& payload, BareTools bare) {
-  if (const Status lines = check_line_ends(program); !lines) return tl::make_unexpected(lines.error());
+  if (const Status whole = check_files(program); !whole) return tl::make_unexpected(whole.error());
   if (const Status same = check_stated_robot(program, arm.robot()); !same) return tl::make_unexpected(same.error());
   std::vector<ToolUse> uses(program.tools.size(), ToolUse::kNone);
   for (const ProgramTarget& target : program.targets) {

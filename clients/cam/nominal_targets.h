@@ -32,7 +32,7 @@ enum class BareTools {
 };
 
 /// In the order of the motions, since one motion may leave its configuration to the one before. Refuses what
-/// choose_tools() refuses, and files whose lines end in CR alone.
+/// choose_tools() refuses, and files that check_files() refuses.
 [[nodiscard]] Result<NominalTargets> nominal_targets(const Program& program, const ArmOfProgram& arm,
                                                      const CellTools& cell, const std::string& tool,
                                                      const std::string& payload,

@@ -14,6 +14,14 @@ namespace trammel::cam {
 
 namespace {
 
+/// By its mark, or by the zeros beside its first letters.
+bool is_utf16(const std::string& text) {
+  if (text.starts_with("\xFF\xFE") || text.starts_with("\xFE\xFF")) return true;
+  if (text.size() < 4) return false;
+  const auto zeros = [&](std::size_t first) { return text[first] == '\0' && text[first + 2] == '\0'; };
+  return zeros(0) != zeros(1);
+}
+
 double near_turn(double angle, double like) { return angle + 360 * std::round((like - angle) / 360); }
 
 /// Of the two ways to write a rotation the one nearer to `like`. Where the middle angle is ±90 deg only a sum of the
@@ -238,6 +246,20 @@ int line_of(const std::string& text, std::size_t at) {
 std::size_t line_begin(const std::string& text, std::size_t at) {
   const std::size_t end = at == 0 ? std::string::npos : text.rfind('\n', at - 1);
   return end == std::string::npos ? 0 : end + 1;
+}
+
+Status check_files(const Program& program) {
+  for (const SourceFile& file : program.files) {
+    if (is_utf16(file.text)) return refused("text in UTF-16, expected UTF-8").in(file.name).next("save it as UTF-8");
+    if (file.text.find('\r') == std::string::npos || file.text.find('\n') != std::string::npos) continue;
+    return refused("its lines end in CR alone").in(file.name).next("save it with line ends LF or CR LF");
+  }
+  if (program.cuts.empty()) return {};
+  const Cut& cut = program.cuts.front();
+  return refused("{}: the file is not whole", cut.what)
+      .in(program.files[cut.file].name)
+      .at_row(cut.line)
+      .next("fetch it from the controller again");
 }
 
 Pose pose_of(Coordinates coordinates, const std::vector<double>& numbers) {

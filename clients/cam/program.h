@@ -184,6 +184,13 @@ struct Reading {
   bool motion = false;  ///< it is a motion, which goes to what is made of it
 };
 
+/// What shows that a file is not whole.
+struct Cut {
+  std::size_t file = 0;
+  int line = 0;
+  std::string what;  ///< a clause: `PROC main has no ENDPROC`
+};
+
 /// Where and how a dialect takes the mark of a correction.
 struct MarkPlace {
   std::size_t at = 0;       ///< first byte of the line that it goes above
@@ -210,6 +217,7 @@ struct Program : StatedRobot {
   std::vector<ProgramMove> moves;
   std::vector<Reading> readings;
   std::vector<std::string> notes;  ///< what could not be compared, a sentence each
+  std::vector<Cut> cuts;
 
   /// Whether any motion or target was seen in any of the files, be it one that is left as it is.
   [[nodiscard]] bool is_understood() const { return !(moves.empty() && targets.empty() && left.empty()); }
@@ -223,6 +231,10 @@ struct ReadOptions {
   std::vector<std::string> idle_axes = {};  ///< external axes that carry neither robot nor part, by axis_called()
   StatedRobot stated = {};                  ///< by files that are no programs
 };
+
+/// Refuses files in UTF-16, lines that end in CR alone (readers count by LF, and comments end with it), and a file that
+/// was cut off, whose missing part may decide what the rest means.
+[[nodiscard]] Status check_files(const Program& program);
 
 /// The row of --frames that tells where the robot stands in the world that the program's frames are told in.
 constexpr const char* kRobotBase = "robot_base";

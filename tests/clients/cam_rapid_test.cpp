@@ -504,5 +504,75 @@ TEST(Rapid, AnAssignmentThatABranchDecidesOrThatIsNotConstantLeavesItsMotions) {
   EXPECT_TRUE(row_of(before.program, "p20").corrected()) << why(before, "p20");
 }
 
+TEST(Rapid, APointThatADisplacementIsMeasuredFromStaysUnlessItIsSplit) {
+  const std::string points = target("pRef", "0,125,400") + target("pNow", "0,125,420") + target("pNext", "0,225,400") +
+                             "  VAR robtarget pCopy;\n  VAR pose shift;\n";
+  const std::string moves = move_l("pRef") + move_l("pNow");
+  const std::string last = move_l("pNext") + "    PDispOff;\n";
+  for (const std::string& displaced :
+       {"    PDispOn\\Rot\\ExeP:=pNow,pRef,tSpindle\\WObj:=wPanel;\n" + last,
+        "    pCopy:=pRef;\n    PDispOn pCopy,tSpindle\\WObj:=wPanel;\n" + last,
+        "    shift:=DefDFrame(pRef,pRef,pRef,pNow,pNow,pNow);\n    PDispSet shift;\n" + last}) {
+    const std::string text = program(points, moves + displaced);
+    const test::Corrected left = rapid(text);
+    EXPECT_NE(why(left, "pRef").find("a displacement is measured from it"), std::string::npos) << why(left, "pRef");
+    EXPECT_TRUE(row_of(left.program, "pNow").corrected()) << why(left, "pNow");
+    EXPECT_FALSE(row_of(left.program, "pNext").corrected());
+    const test::Corrected split = rapid(text, {.split = true});
+    EXPECT_TRUE(row_of(split.program, "pRef").corrected()) << why(split, "pRef");
+    EXPECT_NE(split.program.files[0].text.find(target("pRef", "0,125,400")), std::string::npos);
+  }
+  const test::Corrected array =
+      rapid(program("  CONST robtarget p{2}:=[[[0,125,400]" + kRest + ",[[0,225,400]" + kRest + "];\n",
+                    move_l("p{1}") + move_l("p{2}") + "    PDispOn p{1},tSpindle;\n    PDispOff;\n"));
+  EXPECT_NE(why(array, "p{1}").find("a displacement is measured from it"), std::string::npos) << why(array, "p{1}");
+  EXPECT_TRUE(row_of(array.program, "p{2}").corrected()) << why(array, "p{2}");
+}
+
+TEST(Rapid, AModuleThatIsNotWholeIsRefusedWithTheBlockThatHasNoEnd) {
+  const std::string data = "MODULE M\n" + kTool + kPanel + target("p10", "0,0,400") + "  PROC main()\n";
+  const std::string move = move_l("p10");
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {data + move, "PROC main has no ENDPROC"},
+      {data + move + "    MoveL p10,v100,fi", "PROC main has no ENDPROC"},
+      {data + move + "  ENDPROC\n", "MODULE M has no ENDMODULE"},
+      {data + move + "ENDMODULE\n", "PROC main has no ENDPROC"},
+      {data + move + "  PROC other()\n  ENDPROC\nENDMODULE\n", "PROC main has no ENDPROC"},
+      {data + "    IF di1=1 THEN\n" + move + "  ENDPROC\nENDMODULE\n", "IF has no ENDIF"},
+      {data + "    FOR i FROM 1 TO 3 DO\n" + move + "    ENDWHILE\n  ENDPROC\nENDMODULE\n", "ENDWHILE has no WHILE"}};
+  for (const auto& [text, clause] : cases) {
+    const std::string refusal = rapid(text).refusal;
+    EXPECT_NE(refusal.find(clause + ": the file is not whole"), std::string::npos) << clause << ": " << refusal;
+  }
+  const std::string whole =
+      "    IF di1=1 THEN\n      IF di2=1 WaitTime 1;\n    ELSEIF di2=1 THEN\n    ELSE\n    ENDIF\n"
+      "    TEST n\n    CASE 1,2:\n      WHILE TRUE DO\n      ENDWHILE\n    DEFAULT:\n    ENDTEST\n";
+  EXPECT_EQ(rapid(data + whole + move +
+                  "  ERROR\n    RETRY;\n  ENDPROC\n  LOCAL FUNC num f(num n)\n    RETURN n;\n"
+                  "  ENDFUNC\n  TRAP t\n  ENDTRAP\nENDMODULE\n")
+                .refusal,
+            "");
+}
+
+TEST(Rapid, APointThatOnlyAnUnknownInstructionIsGivenIsLeftAndNotCalledUnused) {
+  const test::Corrected made = rapid(program(target("p10", "0,0,400") + target("p20", "0,10,400"),
+                                             move_l("p10") + "    FCPressL p20,v50,100,fine,tSpindle;\n"));
+  EXPECT_NE(why(made, "p20").find("FCPressL is not known here: it may move the robot there"), std::string::npos)
+      << why(made, "p20");
+  EXPECT_TRUE(row_of(made.program, "p10").corrected());
+}
+
+TEST(Rapid, ANameThatAFileDeclaresTwiceIsLeft) {
+  const std::string first = program(target("p10", "0,0,400"), move_l("p10"));
+  const test::Corrected made = rapid(first + "MODULE N\n" + target("p10", "0,50,400") + "  PROC other()\n" +
+                                     move_l("p10") + "  ENDPROC\nENDMODULE\n");
+  EXPECT_NE(why(made, "p10").find("p10 is declared twice (m.mod line"), std::string::npos) << why(made, "p10");
+}
+
+TEST(Rapid, AMotionThatASensorCorrectsIsLeft) {
+  const test::Corrected made = rapid(program(target("p10", "0,0,400"), move_l("p10", "\\WObj:=wPanel\\Corr")));
+  EXPECT_NE(why(made, "p10").find("a sensor corrects the path"), std::string::npos) << why(made, "p10");
+}
+
 }  // namespace
 }  // namespace trammel::cam

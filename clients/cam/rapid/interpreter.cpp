@@ -90,11 +90,20 @@ Interpreter::Interpreter(const std::vector<SourceFile>& files, const std::vector
     for (std::size_t r = 0; r < modules_[m].routines.size(); ++r)
       routines_[modules_[m].routines[r].name].emplace_back(m, static_cast<int>(r));
     for (const Declaration& declared : modules_[m].declarations) {
-      by_name_[m].emplace(std::pair(declared.routine, declared.name), &declared);
+      const auto [known, fresh] = by_name_[m].emplace(std::pair(declared.routine, declared.name), &declared);
+      if (!fresh && declared.storage != Storage::kLoop) note_twice(m, *known->second, declared);
       if (declared.routine < 0 && !declared.local) global_.emplace(declared.name, Found{&declared, m});
     }
   }
   note_changes();
+}
+
+/// A file of several modules, or one that no controller takes: which of them a name means is not followed.
+void Interpreter::note_twice(std::size_t module, const Declaration& one, const Declaration& other) {
+  const std::string why =
+      fmt::format("{} is declared twice ({} line {}, line {})",
+                  shown(other.spelled.empty() ? other.name : other.spelled), files_[module].name, one.line, other.line);
+  for (const Declaration* declared : {&one, &other}) changed_.emplace(declared, why);
 }
 
 std::string Interpreter::place_of(std::size_t module, int line) const {

@@ -69,6 +69,8 @@ class Reader {
     program_.files = std::move(files);
     for (const SourceFile& file : program_.files) {
       modules_.push_back(parse(file.text));
+      for (const Unbalanced& found : modules_.back().unbalanced)
+        program_.cuts.push_back({modules_.size() - 1, found.line, found.what});
       program_.mark_places.push_back(mark_place(file.text, modules_.back().head_end));
     }
     meaning_.emplace(program_.files, modules_);
@@ -94,10 +96,11 @@ class Reader {
   Program read() {
     note_displacements();
     read_motions();
+    note_references();
     for (std::size_t m = 0; m < modules_.size(); ++m) note_readings(m);
     program_.targets.reserve(sites_.size());
     for (auto& [place, site] : sites_) {
-      finish(site);
+      finish(site, why_kept(place, site));
       site = {};
     }
     list_unused();
@@ -262,9 +265,11 @@ class Reader {
     return both;
   }
   static Confs confs_of(const Instruction& instruction) {
-    const bool off = std::any_of(instruction.arguments.begin(), instruction.arguments.end(),
-                                 [](const Expression& argument) { return argument.label == "off"; });
-    return off ? Confs::kOff : Confs::kOn;
+    return has_label(instruction, "off") ? Confs::kOff : Confs::kOn;
+  }
+  static bool has_label(const Instruction& instruction, std::string_view label) {
+    return std::any_of(instruction.arguments.begin(), instruction.arguments.end(),
+                       [&](const Expression& argument) { return argument.label == label; });
   }
   void join(State& state, const State& other, const std::string& by) {
     state.displaced = std::max(state.displaced, other.displaced);
@@ -340,6 +345,7 @@ class Reader {
       leave(module, motion, meaning_->text_of(*positional[0], *meaning_->scopes_of(module, motion.routine)[0]), why);
     };
     if (is_search(motion.name)) return leave(module, motion, "", "a sensor decides where the motion ends");
+    if (has_label(motion, "corr")) return leave_it("a sensor corrects the path (\\Corr)");
     if (state_.displaced != 0) return leave_it(displacements_[state_.displaced]);
     if (!open_displacement_.empty()) return leave_it(open_displacement_);
     for (const Scope* scope : meaning_->scopes_of(module, motion.routine)) {
@@ -466,7 +472,18 @@ class Reader {
 
   // Places.
 
-  void finish(const Site& site) {
+  /// Why the bytes at a place must stay as they are; empty: they need not.
+  [[nodiscard]] std::string why_kept(const std::pair<std::size_t, std::size_t>& place, const Site& site) const {
+    const auto behind = references_.upper_bound(place);
+    if (behind != references_.begin()) {
+      const auto& [begin, reference] = *std::prev(behind);
+      if (begin.first == place.first && place.second < reference.end) return reference.why;
+    }
+    const auto read = read_.find(site.uses.front().data.declared);
+    return read == read_.end() ? "" : read->second;
+  }
+
+  void finish(const Site& site, const std::string& why_kept) {
     std::vector<std::vector<const Use*>> groups;
     for (const Use& use : site.uses) {
       const auto same = std::find_if(groups.begin(), groups.end(), [&](const auto& group) {
@@ -477,13 +494,12 @@ class Reader {
       else
         same->push_back(&use);
     }
-    const auto read = read_.find(site.uses.front().data.declared);
-    const bool is_read = site.uses.front().data.declared != nullptr && read != read_.end();
+    const bool is_read = !why_kept.empty();
     if ((groups.size() > 1 || is_read) && !options_.split) {
       for (const Use& use : site.uses) program_.moves[use.move].left_some = true;
     }
     if (groups.size() > 1 && !options_.split) return leave_ambiguous(site, groups);
-    if (is_read && !options_.split) return leave_read(site, read->second);
+    if (is_read && !options_.split) return leave_read(site, why_kept);
     for (std::size_t k = 0; k < groups.size(); ++k) {
       if (k == 0 && !is_read)
         add_target(site, groups[k], site.uses.front().data);
@@ -492,11 +508,10 @@ class Reader {
     }
   }
 
-  void leave_read(const Site& site, const std::string& where) {
+  void leave_read(const Site& site, const std::string& why) {
     const Use& first = site.uses.front();
-    program_.left.push_back(
-        {site.name, site.module, first.data.node->line, first.motion->spelled,
-         fmt::format("its numbers are read elsewhere too ({}); --split makes a target of each motion", where)});
+    program_.left.push_back({site.name, site.module, first.data.node->line, first.motion->spelled,
+                             why + "; --split makes a target of each motion"});
   }
 
   void leave_ambiguous(const Site& site, const std::vector<std::vector<const Use*>>& groups) {
@@ -687,6 +702,63 @@ class Reader {
     target.rewrites.push_back(std::move(whole));
   }
 
+  // What displacements are measured from. A correction of it would displace what follows the wrong way.
+
+  /// `PDispOn\ExeP:=pFound,pRef,tGun`: how many of the first arguments are such.
+  static std::size_t old_points(const std::string& name) {
+    static const std::map<std::string, std::size_t> kOldPoints = {{"pdispon", 1}, {"defdframe", 3}, {"defaccframe", 1}};
+    const auto known = kOldPoints.find(name);
+    return known == kOldPoints.end() ? 0 : known->second;
+  }
+
+  void note_references() {
+    std::set<const Declaration*> measured;  // `pRef:=p10;` hands on
+    for (bool grows = true; grows;) {
+      const std::size_t before = measured.size();
+      for (std::size_t m = 0; m < modules_.size(); ++m) {
+        for (const Instruction& instruction : modules_[m].instructions)
+          note_references(instruction.name, instruction.spelled, instruction.arguments, {m, instruction.routine},
+                          measured);
+        for (const Assignment& assignment : modules_[m].assignments) {
+          const Scope at{m, assignment.routine};
+          note_references(assignment.value, at, measured);
+          const auto to = meaning_->find(root_of(assignment.target)->name, at);
+          if (to && measured.contains(to->declaration))
+            note_reference(assignment.value, at, root_text(assignment.target, m), assignment.line, measured);
+        }
+      }
+      grows = measured.size() > before;
+    }
+  }
+
+  void note_references(const std::string& name, const std::string& spelled, const std::vector<Expression>& arguments,
+                       const Scope& at, std::set<const Declaration*>& measured) {
+    std::size_t position = 0;
+    for (const Expression& argument : arguments) {
+      if (argument.label.empty() && position++ < old_points(name))
+        note_reference(argument, at, spelled, argument.line, measured);
+      note_references(argument, at, measured);
+    }
+  }
+  void note_references(const Expression& expression, const Scope& at, std::set<const Declaration*>& measured) {
+    const std::string name = expression.kind == Kind::kCall ? expression.name.text() : "";
+    note_references(name, name, expression.parts, at, measured);
+  }
+
+  void note_reference(const Expression& point, const Scope& at, const std::string& by, int line,
+                      std::set<const Declaration*>& measured) {
+    const auto named = meaning_->find(root_of(point)->name, at);
+    if (named) measured.insert(named->declaration);
+    for (const Scope* scope : meaning_->scopes_of(at.module, at.routine)) {
+      const Told<std::vector<Data>> all = meaning_->data_of(point, *scope);
+      for (const Data& data : all ? *all : std::vector<Data>{}) {
+        references_.try_emplace({data.scope->module, data.node->begin},
+                                Reference{data.node->end, fmt::format("a displacement is measured from it ({}, {})",
+                                                                      shown(by), meaning_->place_of(at.module, line))});
+      }
+    }
+  }
+
   // What else reads the targets that are written anew.
 
   void note_readings(std::size_t m) {
@@ -703,17 +775,20 @@ class Reader {
                                      [](const Expression& argument) { return argument.kind == Kind::kCall; });
       if (motion && !calls) continue;
       calls_routine_ = !motion && meaning_->find_routine(instruction.name, m).has_value();
+      if (!motion && !calls_routine_) note_unknown(m, instruction);
       moves_ = motion;
       note_readings(m, {instruction.begin, instruction.end}, instruction.routine, instruction.line, "");
       calls_routine_ = moves_ = false;
     }
   }
 
-  std::string root_text(const Expression& target, std::size_t m) {
+  /// What a field or an element is of; of another expression itself.
+  static const Expression* root_of(const Expression& target) {
     const Expression* root = &target;
     while ((root->kind == Kind::kField || root->kind == Kind::kElement) && !root->parts.empty()) root = &root->parts[0];
-    return meaning_->text_of(*root, own(m));
+    return root;
   }
+  std::string root_text(const Expression& target, std::size_t m) { return meaning_->text_of(*root_of(target), own(m)); }
 
   void note_readings(std::size_t m, const Span& span, int routine, int line, const std::string& by) {
     if (span.end <= span.begin) return;
@@ -762,7 +837,8 @@ class Reader {
     const bool is_target = data.declared->type == "robtarget" || data.declared->type == "jointtarget";
     const bool numbers = dots > (is_target ? 0 : 1);
     if (numbers && !moves_) {
-      read_.emplace(data.declared, meaning_->place_of(at.module, line));
+      read_.emplace(data.declared,
+                    fmt::format("its numbers are read elsewhere too ({})", meaning_->place_of(at.module, line)));
       return;
     }
     if (calls_routine_) return;  // what becomes of it is told there
@@ -779,7 +855,26 @@ class Reader {
         const auto site = sites_.lower_bound({m, value.begin});
         const bool used = site != sites_.end() && site->first.first == m && site->first.second < value.end;
         if (used || named_.contains(declared.name)) continue;
-        program_.left.push_back({declared.spelled, m, declared.line, "", "no motion in these files goes to it"});
+        const auto unknown = unknown_.find(&declared);
+        if (unknown == unknown_.end())
+          program_.left.push_back({declared.spelled, m, declared.line, "", "no motion in these files goes to it"});
+        else
+          program_.left.push_back(
+              {declared.spelled, m, declared.line, unknown->second->spelled,
+               fmt::format("{} is not known here: it may move the robot there", shown(unknown->second->spelled))});
+      }
+    }
+  }
+
+  /// `FCPressL p10,v50,...`, and procedures of modules that are not there, may be motions.
+  void note_unknown(std::size_t m, const Instruction& instruction) {
+    static const std::set<std::string> kStill = {"pdispon",       "eoffson",       "wzhomejointdef", "wzlimjointdef",
+                                                 "mtooltcpcalib", "mtoolrotcalib", "stooltcpcalib",  "stoolrotcalib"};
+    if (kStill.contains(instruction.name)) return;
+    for (const Expression& argument : instruction.arguments) {
+      for (const Scope* scope : meaning_->scopes_of(m, instruction.routine)) {
+        const Told<std::vector<Data>> all = meaning_->data_of(*root_of(argument), *scope);
+        for (const Data& data : all ? *all : std::vector<Data>{}) unknown_.emplace(data.declared, &instruction);
       }
     }
   }
@@ -806,7 +901,13 @@ class Reader {
   State state_;  ///< of the motion that is read
   bool calls_routine_ = false, moves_ = false;
   bool goes_by_joints_before_ = false, undecided_confs_ = false;
-  std::map<const Declaration*, std::string> read_;  ///< where numbers of a target are read
+  std::map<const Declaration*, std::string> read_;            ///< why the numbers of a target must stay
+  std::map<const Declaration*, const Instruction*> unknown_;  ///< that is given a target and may be a motion
+  struct Reference {
+    std::size_t end = 0;
+    std::string why;
+  };
+  std::map<std::pair<std::size_t, std::size_t>, Reference> references_;  ///< the same, by module and first byte
 };
 
 }  // namespace

@@ -16,6 +16,11 @@ constexpr int kDeepest = 60;  // brackets within brackets
 
 using Kind = Expression::Kind;
 
+std::string in_upper_case(std::string text) {
+  for (char& c : text) c = static_cast<char>(c >= 'a' && c <= 'z' ? c - 'a' + 'A' : c);
+  return text;
+}
+
 class Parser {
  public:
   explicit Parser(std::string_view text) : text_(text), tokens_(tokens_of(text)) {}
@@ -26,10 +31,41 @@ class Parser {
       statement();
       if (at_ == before) ++at_;
     }
+    drop_blocks_down_to(0);
     return std::move(module_);
   }
 
  private:
+  /// What an END... is due for.
+  struct Block {
+    std::string word;  ///< in lower case
+    std::string called;
+    int line = 0;
+  };
+  void open_block(const std::string& word, const std::string& name = {}) {
+    blocks_.push_back({word, name.empty() ? in_upper_case(word) : in_upper_case(word) + " " + name, token().line});
+  }
+  /// The block that the word at hand ends.
+  void close_block(const std::string& word) {
+    std::size_t open = blocks_.size();
+    while (open > 0 && "end" + blocks_[open - 1].word != word) --open;
+    if (open == 0) {
+      const std::string due = in_upper_case(word.substr(std::string_view("end").size()));
+      module_.unbalanced.push_back({fmt::format("{} has no {}", in_upper_case(word), due), token().line});
+      return;
+    }
+    drop_blocks_down_to(open);
+    blocks_.pop_back();
+  }
+  /// Blocks from number `keep` on have no end.
+  void drop_blocks_down_to(std::size_t keep) {
+    for (; blocks_.size() > keep; blocks_.pop_back()) {
+      const Block& block = blocks_.back();
+      module_.unbalanced.push_back(
+          {fmt::format("{} has no END{}", shown(block.called), in_upper_case(block.word)), block.line});
+    }
+  }
+
   [[nodiscard]] const Token& token(std::size_t ahead = 0) const {
     return tokens_[std::min(at_ + ahead, tokens_.size() - 1)];
   }
@@ -86,6 +122,7 @@ class Parser {
       return declaration();
     }
     if (first == "endproc" || first == "endfunc" || first == "endtrap") {
+      close_block(first);
       turn(Step::Kind::kEnd);
       routine_ = -1;
       ++at_;
@@ -94,12 +131,14 @@ class Parser {
     } else if (first == "for") {
       loop();
     } else if (first == "while") {
+      open_block(first);
       turn(Step::Kind::kWhile);
       const std::size_t begin = at_;
       while (!at_end() && word() != "do" && !is_sign(";")) ++at_;
       note_condition(begin);
       ++at_;
     } else if (first == "test") {
+      open_block(first);
       turn(Step::Kind::kSwitch);
       const std::size_t begin = at_;
       while (!at_end() && word() != "case" && word() != "default" && word() != "endtest" && !is_sign(";")) ++at_;
@@ -125,14 +164,16 @@ class Parser {
     module_.turns.push_back({{kind, std::move(label)}, module_.instructions.size()});
   }
   void note_single(const std::string& first) {
-    if (first.starts_with("end"))
+    if (first.starts_with("end") && !is_sign(":", 1)) {
+      close_block(first);
       turn(Step::Kind::kEnd);
-    else if (first == "else" || first == "default")
+    } else if (first == "else" || first == "default") {
       turn(Step::Kind::kElse);
-    else if (first == "error" || first == "undo" || first == "backward")
+    } else if (first == "error" || first == "undo" || first == "backward") {
       turn(Step::Kind::kHandler, fmt::format("the handler '{}' of its routine", shown(first)));
-    else
+    } else {
       turn(Step::Kind::kLabel, first);
+    }
   }
   /// `ERROR (ERR_1, ERR_2)`
   void skip_numbers_of_errors() {
@@ -148,8 +189,11 @@ class Parser {
   void skip_odd_statement() { ++at_; }
 
   void module_head() {
+    drop_blocks_down_to(0);
     ++at_;
+    const std::string spelled(bytes());
     module_.name = take_word();
+    open_block("module", spelled);
     if (take("(")) {
       while (!at_end() && !is_sign(")") && !is_sign(";")) ++at_;
       take(")");
@@ -158,6 +202,7 @@ class Parser {
   }
 
   void record() {
+    open_block("record");
     ++at_;
     Record record;
     record.name = take_word();
@@ -172,6 +217,7 @@ class Parser {
       record.fields.push_back(name);
       take(";");
     }
+    if (!at_end()) close_block("endrecord");
     ++at_;
     module_.records.push_back(std::move(record));
   }
@@ -206,6 +252,8 @@ class Parser {
     Routine routine;
     if (kind == "func") take_word();
     const std::string spelled(bytes());
+    if (routine_ >= 0) drop_blocks_down_to(first_block_of_routine());
+    open_block(kind, spelled);
     routine.name = take_word();
     routine.local = local;
     routine.is_function = kind == "func";
@@ -216,6 +264,11 @@ class Parser {
       turn(Step::Kind::kRoutine, std::to_string(routine_));
     if (take("(")) parameters(routine);
     module_.routines.push_back(std::move(routine));
+  }
+
+  /// Routines stand in a module, or in no block.
+  [[nodiscard]] std::size_t first_block_of_routine() const {
+    return !blocks_.empty() && blocks_.front().word == "module" ? 1 : 0;
   }
 
   void parameters(Routine& routine) {
@@ -257,6 +310,7 @@ class Parser {
     note_condition(begin);
     turn(another ? Step::Kind::kCase : Step::Kind::kIf);
     if (word() == "then") {
+      if (!another) open_block("if");
       ++at_;
       return;
     }
@@ -298,6 +352,7 @@ class Parser {
     counter.name = take_word();
     counter.end = last_end();
     if (!counter.name.empty()) module_.declarations.push_back(std::move(counter));
+    open_block("for");
     turn(Step::Kind::kWhile);
     const std::size_t begin = at_;
     while (!at_end() && word() != "do" && !is_sign(";")) ++at_;
@@ -550,6 +605,7 @@ class Parser {
   std::vector<Token> tokens_;
   std::size_t at_ = 0;
   int routine_ = -1;
+  std::vector<Block> blocks_;
   Module module_;
 };
 

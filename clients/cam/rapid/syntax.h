@@ -124,6 +124,12 @@ struct Record {
   std::vector<std::string> fields, types;
 };
 
+/// A PROC without its ENDPROC, or an ENDIF without its IF: the module is not whole.
+struct Unbalanced {
+  std::string what;  ///< a clause
+  int line = 0;
+};
+
 struct Module {
   std::string name;
   std::size_t head_end = 0;  ///< behind `MODULE name(...)`; 0: there is none
@@ -134,6 +140,7 @@ struct Module {
   std::vector<Record> records;
   std::vector<Condition> conditions;
   std::vector<Turn> turns;  ///< routines are named by their number
+  std::vector<Unbalanced> unbalanced;
 };
 
 /// Never fails: what is not understood is not there.

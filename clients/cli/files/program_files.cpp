@@ -278,6 +278,7 @@ Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOpti
   }
   for (const GivenPose& row : rows) options.frames.emplace(row.name, row.X);
   cam::Program program = cam::read_program(files.dialect, files.files, options);
+  if (const Status whole = cam::check_files(program); !whole) return tl::make_unexpected(whole.error());
   for (const cam::ControllerRobot& robot : *robots) {
     if (!robot.carried_by.empty())
       program.notes.push_back(
