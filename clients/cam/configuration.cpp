@@ -26,6 +26,14 @@ constexpr double kAsNear = 1e-2;      // of the way: how a controller weighs its
 // the branch that was meant. Controllers do not ask for more.
 constexpr double kNextQuarter = kPi / 4;
 
+/// How a controller weighs the joints is not published. Ways that differ by less than kAsNear are decided where their
+/// sums and their longest joints say the same.
+bool is_nearer(const JointVector& way, const JointVector& other) {
+  if (other.norm() - way.norm() > kSameJoints + kAsNear * way.norm()) return true;
+  return other.lpNorm<1>() - way.lpNorm<1>() > kSameJoints &&
+         way.lpNorm<Eigen::Infinity>() - other.lpNorm<Eigen::Infinity>() < kSameJoints;
+}
+
 /// Where the branch that is said has joints far outside the quarter turns that are said, which joints and how. A
 /// stretched wrist leaves joints 4 and 6 open.
 std::string contradiction(const Configuration& said, const JointVector& q) {
@@ -253,24 +261,19 @@ std::vector<int> ArmOfProgram::branches_of(const Chain& arm, const JointVector& 
 NominalJoints ArmOfProgram::nearest_branch(const Chain& arm, const Pose& X_BF, const JointVector& from,
                                            bool on_a_line) const {
   const std::vector<int> own = on_a_line ? branches_of(arm, from) : std::vector<int>();
-  std::optional<JointVector> best, second;
-  double least = std::numeric_limits<double>::infinity(), next = least;
+  std::vector<JointVector> found;
   for (int number = 0; number < kBranches; ++number) {
     if (!own.empty() && std::find(own.begin(), own.end(), number) == own.end()) continue;
     const auto q = branch(arm, X_BF, number, from);
-    if (!q || arm.joint_outside_limits(*q)) continue;
-    const double way = (*q - from).norm();
-    if (best && (*q - *best).norm() < kSameJoints) continue;
-    if (way < least) {
-      second = std::exchange(best, q);
-      next = std::exchange(least, way);
-    } else if (way < next) {
-      second = q;
-      next = way;
-    }
+    if (q && !arm.joint_outside_limits(*q)) found.push_back(*q);
   }
-  if (!best) return {std::nullopt, std::nullopt, "no joints within the limits bring the tool there"};
-  if (second && next - least <= kSameJoints + kAsNear * least)
+  if (found.empty()) return {std::nullopt, std::nullopt, "no joints within the limits bring the tool there"};
+  const JointVector best = *std::min_element(
+      found.begin(), found.end(), [&](const auto& a, const auto& b) { return (a - from).norm() < (b - from).norm(); });
+  const bool undecided = std::any_of(found.begin(), found.end(), [&](const JointVector& other) {
+    return (other - best).norm() >= kSameJoints && !is_nearer(best - from, other - from);
+  });
+  if (undecided)
     return {std::nullopt, std::nullopt,
             "two postures are equally near to the joints before, and the program does not say which"};
   return {best, std::nullopt, ""};

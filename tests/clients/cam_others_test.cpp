@@ -272,6 +272,63 @@ TEST(Tables, RoboDkHeadersSayWhichColumnsArePoses) {
             "1,1800.123,-0.235,800.346,0.0000,60.0000,0.0000\n");
 }
 
+const std::string kPose = "p[1.8, 0, 0.8, 0, 1.5707963, 0]";
+std::string with_lines(const std::string& lines) {
+  return "def p():\n" + kTcp + "  movej([0, -0.35, 0.35, 0, 0.5, 0])\n" + lines + "end\n";
+}
+
+TEST(UrScript, AParameterHidesWhatIsCalledSoElsewhere) {
+  const test::Corrected made =
+      script(with_lines("  q = " + kPose + "\n  def to(q):\n    movel(q)\n  end\n  to(" + kPose + ")\n  movel(q)\n"));
+  EXPECT_EQ(made.program.left_alone(), 2u) << made.refusal;
+  EXPECT_NE(why(made, "q").find("q is a parameter of to (p.script line 5)"), std::string::npos) << why(made, "q");
+}
+
+TEST(UrScript, WhatAnOffsetOrAForceMovesIsLeftUntilItEnds) {
+  for (const auto& [begin, end, clause] :
+       {std::tuple("path_offset_enable()", "path_offset_disable()", "an offset is added to the path (line 4)"),
+        std::tuple("force_mode(tool_pose(), s, w, 2, l)", "end_force_mode()", "a force decides where the tool goes")}) {
+    const std::string first = "  " + std::string(begin) + "\n  movel(" + kPose + ")\n";
+    const test::Corrected made =
+        script(with_lines(first + "  " + end + "\n  movel(p[1.8, 0.1, 0.8, 0, 1.5707963, 0])\n"));
+    EXPECT_NE(why(made, kPose).find(clause), std::string::npos) << why(made, kPose);
+    EXPECT_EQ(made.program.left_alone(), 1u) << made.refusal;
+  }
+}
+
+TEST(UrScript, TheMotionsThatChooseTheirOwnSpeedAreMotions) {
+  const test::Corrected made = script(with_lines("  optimovel(" + kPose + ", a=0.5, v=0.5)\n"));
+  EXPECT_TRUE(row_of(made.program, kPose).corrected()) << made.refusal << why(made, kPose);
+}
+
+// Yaskawa again
+
+const std::string kPoint = "C00000=1800.000,-250.000,800.000,0.0000,60.0000,0.0000\r\n";
+
+TEST(Inform, ARelativeJobThatACallGivesAnotherFrameIsLeft) {
+  const std::string relative = job("///USER 1\r\n///POSTYPE USER\r\n" + kPoint, "MOVL C00000 V=138.0\r\n");
+  for (const bool given : {true, false}) {
+    const std::string call =
+        "/JOB\r\n//NAME A\r\n//INST\r\nNOP\r\nCALL JOB:DRILL" + std::string(given ? " UF#(2)" : "") + "\r\nEND\r\n";
+    const test::Corrected made = corrected_by_shift(Dialect::kInform, {{"a.jbi", call}, {"d.jbi", relative}},
+                                                    {.frames = {{"TOOL[1]", kSpindle}, {"USER[1]", Pose::Identity()}}});
+    EXPECT_EQ(row_of(made.program, "C00000").corrected(), !given) << made.refusal << why(made, "C00000");
+    EXPECT_EQ(why(made, "C00000").find("gives the job another user frame (a.jbi line 5)") != std::string::npos, given);
+  }
+}
+
+TEST(Inform, AnInstructionThatIsNotKnownLeavesThePositionThatItIsGiven) {
+  const test::Corrected made = jbi(job(kPoint, "SMOVL C00000 V=138.0\r\n"));
+  EXPECT_NE(why(made, "C00000").find("SMOVL is not known here: it may move the robot there"), std::string::npos)
+      << made.refusal << why(made, "C00000");
+}
+
+TEST(Inform, APositionThatStandsThereTwiceIsLeft) {
+  const test::Corrected made = jbi(job(kPoint + kPoint, "MOVL C00000 V=138.0\r\n"));
+  EXPECT_NE(why(made, "C00000").find("it stands there twice (line 9, line 10)"), std::string::npos)
+      << made.refusal << why(made, "C00000");
+}
+
 TEST(OtherDialects, WhatIsNoneIsLeftAsItIs) {
   for (const Dialect dialect : {Dialect::kInform, Dialect::kUrScript, Dialect::kCamRob, Dialect::kRoboDk}) {
     for (const std::string& text : std::vector<std::string>{
@@ -282,6 +339,28 @@ TEST(OtherDialects, WhatIsNoneIsLeftAsItIs) {
       EXPECT_EQ(made.program.files[0].text, text);
     }
   }
+}
+
+TEST(Programs, TextInUtf16IsRefusedAsSuchInEveryDialect) {
+  const std::string rapid = "MODULE M\r\n";
+  for (const Dialect dialect : {Dialect::kRapid, Dialect::kFanuc, Dialect::kKrl, Dialect::kInform, Dialect::kUrScript,
+                                Dialect::kCamRob, Dialect::kRoboDk}) {
+    for (const bool marked : {true, false}) {
+      std::string text = marked ? "\xFF\xFE" : "";
+      for (const char c : rapid) text += {c, '\0'};
+      const std::string refusal = corrected_by_shift(dialect, {{"m", text}}).refusal;
+      EXPECT_NE(refusal.find("text in UTF-16, expected UTF-8"), std::string::npos) << name_of(dialect) << refusal;
+    }
+  }
+}
+
+TEST(Programs, AScriptOrJobThatWasCutOffIsRefused) {
+  const std::string script =
+      corrected_by_shift(Dialect::kUrScript, {{"u", "def a():\n  movel(p[1,0,1,0,0,0])\n"}}).refusal;
+  EXPECT_NE(script.find("def has no end: the file is not whole"), std::string::npos) << script;
+  const std::string cut = "/JOB\n//NAME A\n//INST\nNOP\nMOVL C00000 V=1\n";
+  const std::string refusal = corrected_by_shift(Dialect::kInform, {{"j", cut}}).refusal;
+  EXPECT_NE(refusal.find("the job has no END: the file is not whole"), std::string::npos) << refusal;
 }
 
 TEST(Programs, NumbersThatNoRobotReachesAreLeftAndNothingIsWrittenBehindAnUnfinishedLine) {

@@ -226,6 +226,21 @@ TEST(Posture, TwoPosturesThatAreEquallyNearAreLeft) {
   EXPECT_NE(last_of(made).why_not.find("equally near"), std::string::npos) << last_of(made).why_not;
 }
 
+TEST(Posture, OfTwoPosturesThatAreNearlyAsNearTheOneIsTakenThatEveryMeasureCallsNearer) {
+  std::mt19937 random(17);
+  const Joints q = with({0.6, -1.4, 1.3, -1.1, 1.2, 0.4});
+  Joints other = Joints::Constant(100);
+  for (const Joints& one : oracle_solutions(oracle_flange(q), random)) {
+    const Joints turned = turned_to(one, q);
+    if ((turned - q).norm() > 1e-3 && (turned - q).norm() < (other - q).norm()) other = turned;
+  }
+  // Nearer to q by four thousandths of the way, along the straight line between the two.
+  const Joints from = q + 0.498 * (other - q);
+  const NominalTargets made = ur("  movej(" + joints_text(from) + ")\n  movej(" + pose_of_joints(q) + ")\n");
+  ASSERT_TRUE(last_of(made).q) << last_of(made).why_not;
+  EXPECT_LT((*last_of(made).q - q).norm(), 1e-5);
+}
+
 // A line does not turn the wrist over: joint 5 keeps its sign, and joints 4 and 6 stay within half a turn.
 TEST(Posture, WhatATargetOfKrlDoesNotSayFollowsFromTheMotionBeforeWhereverThatTargetStands) {
   const Chain chain = read_robot(TRAMMEL_SOURCE_DIR "/models/kuka_kr210-r2700-extra.yaml").value();

@@ -20,6 +20,7 @@ struct Position {
   int line = 1;
   std::string kind, tool, user;  ///< as POSTYPE, TOOL, USER stood above it
   std::vector<int> conf;         ///< RCONF
+  int again_at = 0;              ///< the line of another one of that name; 0: there is none
   std::vector<Piece> numbers;
 };
 
@@ -42,6 +43,8 @@ class Job {
       const std::size_t end = std::min(text_.find('\n', begin), text_.size());
       const std::string_view line = std::string_view(text_).substr(begin, end - begin);
       if (line.starts_with("//INST")) instructions = true;
+      if (line.starts_with("/JOB")) jobs_at_ = number;
+      if (instructions && is_end(line)) jobs_at_ = 0;
       if (line.starts_with("NOP") && instructions && program_.mark_places[index_].at == text_.size())
         program_.mark_places[index_].at = std::min(end + 1, text_.size());
       if (line.starts_with("//NAME ")) name_ = value_behind(line);
@@ -52,6 +55,7 @@ class Job {
         header(line, begin, end, number);
       begin = end + 1;
     }
+    if (jobs_at_ > 0) program_.cuts.push_back({index_, jobs_at_, "the job has no END"});
   }
 
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -60,6 +64,7 @@ class Job {
   void note_settings(std::map<std::string, std::string>& set) const {
     for (const Statement& statement : statements_) {
       const std::vector<Piece> pieces = pieces_at(statement);
+      note_frame_of_call(statement, pieces, set);
       if (pieces.size() < 4 || (!pieces[0].is("MFRAME") && !pieces[0].is("SETTOOL"))) continue;
       const bool numbered = pieces.size() > 5 && pieces[2].is("#") && pieces[4].kind == Piece::Kind::kNumber;
       const std::string what = fmt::format("{}[{}]", pieces[0].is("MFRAME") ? "USER" : "TOOL",
@@ -68,6 +73,18 @@ class Job {
                   fmt::format("{} is set at run time ({} line {})", what, program_.files[index_].name, statement.line));
     }
   }
+  /// `CALL JOB:DRILL UF#(2)`: a relative job goes by another user frame than the one in its head.
+  void note_frame_of_call(const Statement& statement, const std::vector<Piece>& pieces,
+                          std::map<std::string, std::string>& set) const {
+    if (pieces.size() < 4 || (!pieces[0].is("CALL") && !pieces[0].is("JUMP")) || !pieces[1].is("JOB")) return;
+    const bool frame = std::any_of(pieces.begin(), pieces.end(), [](const Piece& piece) { return piece.is("UF"); });
+    if (frame)
+      set.emplace(frame_of_call(word_from(pieces[3].begin)),
+                  fmt::format("{} {} gives the job another user frame ({} line {})", pieces[0].text,
+                              shown(word_from(pieces[3].begin)), program_.files[index_].name, statement.line));
+  }
+  static std::string frame_of_call(const std::string& job) { return "JOB:" + job; }
+
   /// Of all jobs.
   void take_settings(const std::map<std::string, std::string>& set) { set_ = &set; }
   [[nodiscard]] const std::vector<Statement>& statements() const { return statements_; }
@@ -115,6 +132,8 @@ class Job {
   std::string describe(const Site& site, ProgramTarget& target) const {
     const Position& position = positions_.at(site.name);
     target.line = position.line;
+    if (position.again_at != 0)
+      return fmt::format("it stands there twice (line {}, line {})", position.line, position.again_at);
     if (position.kind == "PULSE") return "it is in pulses, which need the robot's gear data";
     if (position.numbers.size() < 6) return fmt::format("it has {} numbers, 6 are due", position.numbers.size());
     target.coordinates = Coordinates::kAnglesXyz;
@@ -129,6 +148,11 @@ class Job {
   }
 
  private:
+  static bool is_end(std::string_view line) {
+    const std::size_t first = std::min(line.find_first_not_of(" \t"), line.size());
+    return line.substr(first).starts_with("END") &&
+           line.find_first_not_of(" \t\r", first + 3) == std::string_view::npos;
+  }
   static std::string value_behind(std::string_view line) {
     const std::size_t at = line.find(' ');
     if (at == std::string_view::npos) return "";
@@ -161,7 +185,8 @@ class Job {
     for (const Piece& piece : pieces_of(text_, begin + equals + 1, end, number, {})) {
       if (piece.kind == Piece::Kind::kNumber) position.numbers.push_back(piece);
     }
-    positions_.emplace(std::string(line.substr(0, equals)), std::move(position));
+    const auto [known, fresh] = positions_.emplace(std::string(line.substr(0, equals)), std::move(position));
+    if (!fresh) known->second.again_at = number;
   }
 
   /// What stands behind the position in a motion; `BP001` is a variable.
@@ -213,6 +238,7 @@ class Job {
     if (position.kind == "USER") {
       frame.name = fmt::format("USER[{}]", position.user);
       frame.why_not = why_set(frame.name, "USER[*]");
+      if (frame.why_not.empty()) frame.why_not = why_set(frame_of_call(name_), "");
       if (!frame.why_not.empty()) return known_frame(std::move(frame));
       if (!take_row(frame.name, options_, frame))
         frame.why_not = fmt::format("{} is not in the job: --frames tells its value", shown(frame.name));
@@ -226,7 +252,7 @@ class Job {
 
   std::size_t known_frame(ProgramFrame frame) {
     for (std::size_t k = 0; k < program_.frames.size(); ++k) {
-      if (program_.frames[k].name == frame.name) return k;
+      if (program_.frames[k].name == frame.name && program_.frames[k].why_not == frame.why_not) return k;
     }
     program_.frames.push_back(std::move(frame));
     return program_.frames.size() - 1;
@@ -256,7 +282,8 @@ class Job {
     if (pieces.empty()) return;
     const std::string word(pieces[0].text);
     static const std::set<std::string> kMotions = {"MOVJ", "MOVL", "MOVC", "MOVS", "IMOV"};
-    if (!kMotions.contains(word) || pieces.size() < 2) return;
+    if (pieces.size() < 2) return;
+    if (!kMotions.contains(word)) return unknown(statement, pieces);
     const bool goes_on = !program_.moves.empty() && program_.moves.back().file == index_ && last_motion_ == word;
     program_.moves.push_back({index_, number, {}, word == "MOVC"});
     program_.moves.back().arc_goes_on = word == "MOVC" && goes_on;
@@ -289,6 +316,22 @@ class Job {
   }
 
  private:
+  /// `SMOVL C00000 ...`, `SYMOVL C00000 ...`: of a part that moves, or more.
+  void unknown(const Statement& statement, const std::vector<Piece>& pieces) {
+    static const std::set<std::string> kStill = {"REFP", "MFRAME", "SETTOOL"};
+    const std::string word = word_from(pieces[0].begin);
+    if (kStill.contains(word)) return;
+    for (const Piece& piece : pieces) {
+      const std::string name(piece.text);
+      if (piece.text[0] != 'C' || !positions_.contains(name)) continue;
+      used_.insert(name);
+      program_.moves.push_back({index_, statement.line, {}, false});
+      program_.moves.back().left_some = true;
+      program_.left.push_back({name, index_, statement.line, word,
+                               fmt::format("{} is not known here: it may move the robot there", shown(word))});
+    }
+  }
+
   /// `V=138.0`, mm/s, of a motion of the tool. `VJ=50.00` is a share of what the axes can.
   static std::optional<double> speed_of(const std::vector<Piece>& pieces) {
     for (std::size_t at = 0; at + 2 < pieces.size(); ++at) {
@@ -318,6 +361,7 @@ class Job {
   Sites& sites_;
   const ReadOptions& options_;
   const std::string& text_;
+  int jobs_at_ = 0;  ///< the line of a job's head that has no end yet
   Position now_;
   std::map<std::string, Position> positions_;
   std::set<std::string> used_;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <set>
 #include <tl/expected.hpp>
@@ -48,15 +49,33 @@ struct Load {
   std::string why_not;
 };
 
+/// What moves the tool away from where motions say, from a function to another.
+struct Superposed {
+  std::set<std::string_view> begins;
+  std::string_view ends;
+  const char* why;
+};
+const std::array<Superposed, 3>& superposed() {
+  static const std::array<Superposed, 3> kAll = {
+      {{{"track_conveyor_linear", "track_conveyor_circular"},
+        "stop_conveyor_tracking",
+        "it is seen from a conveyor that moves"},
+       {{"path_offset_enable"}, "path_offset_disable", "an offset is added to the path"},
+       {{"force_mode"}, "end_force_mode", "a force decides where the tool goes"}}};
+  return kAll;
+}
+
 /// What is set when a motion comes.
 struct State {
-  std::size_t tool = 0, load = 0;  ///< load 0: not said
-  int tracks_at = 0;               ///< the line that follows a conveyor; 0: none does
+  std::size_t tool = 0, load = 0;   ///< load 0: not said
+  std::array<int, 3> superposed{};  ///< the line that begins each; 0: it does not hold
   bool operator==(const State&) const = default;
 };
 
+/// Whether the axes are commanded, whatever way the tool takes.
+bool is_of_axes(const Piece& piece) { return piece.is("movej") || piece.is("optimovej"); }
 bool is_motion(const Piece& piece) {
-  return piece.is("movel") || piece.is("movej") || piece.is("movep") || piece.is("movec");
+  return is_of_axes(piece) || piece.is("movel") || piece.is("movep") || piece.is("movec") || piece.is("optimovel");
 }
 
 /// Moves the arm to where no pose says.
@@ -84,17 +103,19 @@ class Script {
     program_.mark_places.push_back({text_.starts_with("\xEF\xBB\xBF") ? std::size_t{3} : 0, "# "});
     const std::size_t tool = unknown_tool();
     for (std::size_t at = 0; at < pieces_.size(); ++at) note_assignment(at);
+    for (std::size_t at = 0; at < pieces_.size(); ++at) note_parameters(at);
+    note_cuts();
     find_steps();
     Flow flow = flow_of(steps_);
     flow.entries = {0};
     const std::vector<State> states = states_before(
-        flow, State{tool, 0, 0}, [&](std::size_t s, State& state) { set(step_at_[s], state); },
+        flow, State{tool, 0, {}}, [&](std::size_t s, State& state) { set(step_at_[s], state); },
         [&](State& state, const State& other, const std::string& by) { join(state, other, by); });
     for (std::size_t s = 0; s < steps_.size(); ++s) {
       const std::size_t at = step_at_[s];
       if (is_motion(pieces_[at])) {
         tool_ = tool_carrying(states[s]);
-        tracks_at_ = states[s].tracks_at;
+        superposed_ = states[s].superposed;
         move_of_.emplace(s, program_.moves.size());
         motion(at);
       }
@@ -124,6 +145,8 @@ class Script {
   }
 
  private:
+  static bool defines(const Piece& piece) { return piece.is("def") || piece.is("thread") || piece.is("sec"); }
+
   /// The words that decide the order, and the functions that move the robot or set something.
   void find_steps() {
     using Kind = Step::Kind;
@@ -131,7 +154,6 @@ class Script {
         {"if", Kind::kIf},      {"elif", Kind::kCase},  {"else", Kind::kElse},         {"while", Kind::kWhile},
         {"end", Kind::kEnd},    {"break", Kind::kExit}, {"continue", Kind::kContinue}, {"return", Kind::kReturn},
         {"halt", Kind::kReturn}};
-    const auto defines = [](const Piece& piece) { return piece.is("def") || piece.is("thread") || piece.is("sec"); };
     std::set<std::string> functions;
     for (std::size_t at = 0; at + 1 < pieces_.size(); ++at) {
       if (pieces_[at].is("def")) functions.emplace(pieces_[at + 1].text);
@@ -160,6 +182,20 @@ class Script {
     }
   }
 
+  /// `def`, `if` and `while` have an `end` each.
+  void note_cuts() {
+    std::vector<const Piece*> open;
+    for (const Piece& piece : pieces_) {
+      if (piece.kind != Piece::Kind::kWord) continue;
+      if (defines(piece) || piece.is("if") || piece.is("while")) open.push_back(&piece);
+      if (!piece.is("end")) continue;
+      if (open.empty()) return program_.cuts.push_back({index_, piece.line, "an end without its beginning"});
+      open.pop_back();
+    }
+    if (!open.empty())
+      program_.cuts.push_back({index_, open.back()->line, fmt::format("{} has no end", open.back()->text)});
+  }
+
   /// The controller takes the joints nearest to those before.
   void note_order(const Flow& flow) {
     const auto before = motions_before(flow, [&](std::size_t s) -> std::optional<std::size_t> {
@@ -171,9 +207,10 @@ class Script {
 
   void set(std::size_t at, State& state) {
     if (at + 1 >= pieces_.size() || !pieces_[at + 1].is("(")) return;
-    if (pieces_[at].is("track_conveyor_linear") || pieces_[at].is("track_conveyor_circular"))
-      state.tracks_at = pieces_[at].line;
-    if (pieces_[at].is("stop_conveyor_tracking")) state.tracks_at = 0;
+    for (std::size_t k = 0; k < state.superposed.size(); ++k) {
+      if (superposed()[k].begins.contains(pieces_[at].text)) state.superposed[k] = pieces_[at].line;
+      if (pieces_[at].is(superposed()[k].ends)) state.superposed[k] = 0;
+    }
     if (pieces_[at].is("set_tcp")) state.tool = tool_set(at);
     if (pieces_[at].is("set_payload") || pieces_[at].is("set_target_payload") || pieces_[at].is("set_payload_mass") ||
         pieces_[at].is("set_payload_cog"))
@@ -181,7 +218,8 @@ class Script {
   }
 
   void join(State& state, const State& other, const std::string& by) {
-    state.tracks_at = std::max(state.tracks_at, other.tracks_at);
+    for (std::size_t k = 0; k < state.superposed.size(); ++k)
+      state.superposed[k] = std::max(state.superposed[k], other.superposed[k]);
     const std::string why =
         by.empty() ? "a branch or a loop of the script decides it" : fmt::format("{} may change it", by);
     if (state.tool != other.tool && program_.tools[state.tool].why_not.empty()) {
@@ -383,6 +421,18 @@ class Script {
       variable.value.kind = Value::Kind::kOther;
   }
 
+  /// `def drill(hole, depth=0.01):` hides what is called so elsewhere.
+  void note_parameters(std::size_t at) {
+    if (!pieces_[at].is("def") || at + 2 >= pieces_.size() || !pieces_[at + 2].is("(")) return;
+    for (std::size_t next = at + 3; next < pieces_.size() && !pieces_[next].is(")"); ++next) {
+      const bool begins = pieces_[next - 1].is("(") || pieces_[next - 1].is(",");
+      if (!begins || pieces_[next].kind != Piece::Kind::kWord) continue;
+      variables_[std::string(pieces_[next].text)].changed =
+          fmt::format("{} is a parameter of {} ({} line {})", shown(std::string(pieces_[next].text)),
+                      shown(std::string(pieces_[at + 1].text)), program_.files[index_].name, pieces_[at].line);
+    }
+  }
+
   Told<Value> resolved(const Value& value) const {
     Value now = value;
     for (int depth = 0; now.kind == Value::Kind::kName && depth < kDeepest; ++depth) {
@@ -436,7 +486,7 @@ class Script {
     program_.moves.push_back({index_, pieces_[at].line, {}, false});
     ProgramMove& move = program_.moves.back();
     move.is_arc = pieces_[at].is("movec");
-    move.choice = pieces_[at].is("movej") ? JointChoice::kNearest : JointChoice::kOnALine;
+    move.choice = is_of_axes(pieces_[at]) ? JointChoice::kNearest : JointChoice::kOnALine;
     std::size_t next = at + 2;
     const int count = pieces_[at].is("movec") ? 2 : 1;
     for (int k = 0; k < count; ++k) {
@@ -447,7 +497,9 @@ class Script {
         why = take_inverse(value, move);
       else if (!ends_here(next, pieces_[at].line) && next < pieces_.size() && !pieces_[next].is(","))
         value.kind = Value::Kind::kOther;
-      if (tracks_at_ != 0) why = fmt::format("it is seen from a conveyor that moves (line {})", tracks_at_);
+      for (std::size_t s = 0; s < superposed_.size(); ++s) {
+        if (superposed_[s] != 0) why = fmt::format("{} (line {})", superposed()[s].why, superposed_[s]);
+      }
       if (why.empty())
         use(at, value);
       else
@@ -483,7 +535,7 @@ class Script {
 
   /// `v=0.1`, or the second number behind the target, m/s, of a motion of the tool.
   void note_speed(std::size_t at, std::size_t next) {
-    if (pieces_[at].is("movej")) return;
+    if (is_of_axes(pieces_[at])) return;
     const std::size_t first = next;
     for (; next + 2 < pieces_.size() && pieces_[next].line == pieces_[at].line && !pieces_[next].is(")"); ++next) {
       const bool named = pieces_[next].is("v") && pieces_[next + 1].is("=");
@@ -511,7 +563,7 @@ class Script {
       program_.moves.back().axes = in_degrees(Coordinates::kJointRadians, numbers_in(*now));
     sites_.add(index_, now->begin, name,
                {tool_, 0, std::string(pieces_[at].text), index_, pieces_[at].line, program_.moves.size() - 1,
-                !pieces_[at].is("movej")});
+                !is_of_axes(pieces_[at])});
   }
 
   static std::string rewrite_numbers(const Value& value, ProgramTarget& target) {
@@ -555,7 +607,7 @@ class Script {
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> carrying_;
   std::map<std::size_t, std::string> read_;     ///< why the numbers at a place must stay
   std::size_t tool_ = 0;                        ///< of the motion that is read
-  int tracks_at_ = 0;                           ///< the same
+  std::array<int, 3> superposed_{};             ///< the same
   std::map<std::size_t, std::size_t> move_of_;  ///< of Program::moves, by the step
   std::map<std::string, Variable> variables_;
   std::map<std::size_t, Value> values_;

@@ -16,7 +16,7 @@ import dataclasses
 import io
 import json
 import os
-from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, TypeVar, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -71,6 +71,50 @@ def _asked_targets(pose: Optional[Table], joints_deg: Optional[Table], conf: Opt
     if wanted is None and joints is None:
         raise Usage(f"pose: neither a pose ({', '.join(POSE)}) nor joints (q1_deg ...) among its columns")
     return (wanted, joints, targets.conf() if conf is None else branches(conf), *_in_order(context))
+
+
+def _with_circumstances(pose: Optional[Table], joints_deg: Optional[Table]) -> Tuple[Optional[Table], str]:
+    """The frame whose columns say them, and its argument."""
+    return (joints_deg, "joints_deg") if Frame.of(pose, "pose") is None else (pose, "pose")
+
+
+Answer = TypeVar("Answer", "Predictions", "Corrections")
+
+
+def _in_parts(table: Optional[Table], argument: str, given: Dict[str, Any],
+              ask: Callable[[Callable[..., Any]], Answer]) -> Answer:
+    """Of a frame whose rows differ in tool, payload, approach or temperature: what `ask` says of each part of it, in the
+    order of its rows. `ask` is handed what takes the part of an argument."""
+    frame = Frame.of(table, argument)
+    parts = [] if frame is None else frame.parts(given)
+    if len(parts) < 2:
+        return ask(lambda values, least=1: values)
+    order = np.concatenate(parts)
+    answers = []
+    for rows in parts:
+        def of_part(values: Any, least: int = 1, rows: Any = rows) -> Any:
+            if values is None or np.ndim(values) < least or len(values) != len(order):
+                return values
+            return values.iloc[rows] if hasattr(values, "iloc") else np.asarray(values)[rows]
+
+        try:
+            answers.append(ask(of_part))
+        except TrammelError as error:
+            raise error.seen_in(rows) from None
+    return _joined(answers, np.argsort(order))
+
+
+def _joined(answers: Sequence[Answer], order: npt.NDArray[np.intp]) -> Answer:
+    def joined(name: str) -> Any:
+        values = [getattr(answer, name) for answer in answers]
+        if name == "joint_columns":
+            return values[0]
+        if isinstance(values[0], np.ndarray):
+            return np.concatenate(values)[order]
+        flat = [item for value in values for item in value]
+        return [flat[k] for k in order]
+
+    return dataclasses.replace(answers[0], **{field.name: joined(field.name) for field in dataclasses.fields(answers[0])})
 
 
 def _in_order(context: Mapping[str, Any]) -> Tuple[str, str, List[int], Optional[float]]:
@@ -365,8 +409,9 @@ class Model:
         `tool`, `payload`: ids of the cell; empty: its only one. `directions`: from which each joint is approached,
         n of -1, 0, +1. Raises `Refused` with the row of a pose beyond the limits.
         """
-        return Predictions(**self._inside.predict(*_asked_poses(
-            joints_deg, self._joint_columns, tool=tool, payload=payload, directions=directions, temperature_c=temperature_c)))
+        given = {"tool": tool, "payload": payload, "directions": directions, "temperature_c": temperature_c}
+        return _in_parts(joints_deg, "joints_deg", given, lambda of_part: Predictions(
+            **self._inside.predict(*_asked_poses(of_part(joints_deg, 2), self._joint_columns, **given))))
 
     def correct(self, pose: Optional[Table] = None, joints_deg: Optional[Table] = None,
                 conf: Optional[npt.ArrayLike] = None, tool: str = "", payload: str = "",
@@ -378,9 +423,10 @@ class Model:
         Without `pose` the nominal poses at `joints_deg` are wanted. `pose` may be a pandas frame with the columns of a file
         of targets: the pose, joints, `conf`. A target that cannot be corrected says so in its status.
         """
-        return Corrections(**self._inside.correct(*_asked_targets(
-            pose, joints_deg, conf, self._joint_columns, tool=tool, payload=payload, directions=directions,
-            temperature_c=temperature_c)), joint_columns=self._joint_columns)
+        given = {"tool": tool, "payload": payload, "directions": directions, "temperature_c": temperature_c}
+        return _in_parts(*_with_circumstances(pose, joints_deg), given, lambda of_part: Corrections(
+            **self._inside.correct(*_asked_targets(of_part(pose, 2), of_part(joints_deg, 2), of_part(conf),
+                                                   self._joint_columns, **given)), joint_columns=self._joint_columns))
 
     def __repr__(self) -> str:
         return f"<Model {self.id} of {self.facts['cell']}: {self.facts['level']}, bias {self.bias}>"
@@ -449,17 +495,18 @@ class Session:
     def predict(self, cell: str, joints_deg: Table, tool: str = "", payload: str = "",
                 directions: Sequence[int] = (), temperature_c: Optional[float] = None) -> Predictions:
         """As `Model.predict()`, by the model in force: `joints_deg` (N, n) or (n,), deg, of rails mm."""
-        _, items = self._inside.predict(cell, *_asked_poses(
-            joints_deg, None, tool=tool, payload=payload, directions=directions, temperature_c=temperature_c))
-        return Predictions(**items)
+        given = {"tool": tool, "payload": payload, "directions": directions, "temperature_c": temperature_c}
+        return _in_parts(joints_deg, "joints_deg", given, lambda of_part: Predictions(
+            **self._inside.predict(cell, *_asked_poses(of_part(joints_deg, 2), None, **given))[1]))
 
     def correct(self, cell: str, pose: Optional[Table] = None, joints_deg: Optional[Table] = None,
                 conf: Optional[npt.ArrayLike] = None, tool: str = "", payload: str = "",
                 directions: Sequence[int] = (), temperature_c: Optional[float] = None) -> Corrections:
         """As `Model.correct()`, by the model in force: `pose` (N, 7), `joints_deg` (N, n), `conf` (N,)."""
-        _, items = self._inside.correct(cell, *_asked_targets(
-            pose, joints_deg, conf, None, tool=tool, payload=payload, directions=directions, temperature_c=temperature_c))
-        return Corrections(**items)
+        given = {"tool": tool, "payload": payload, "directions": directions, "temperature_c": temperature_c}
+        return _in_parts(*_with_circumstances(pose, joints_deg), given, lambda of_part: Corrections(
+            **self._inside.correct(cell, *_asked_targets(of_part(pose, 2), of_part(joints_deg, 2), of_part(conf), None,
+                                                         **given))[1]))
 
     def submit(self, cell: str, batch: Batch) -> int:
         """Hands in measurements, from which the service trains. Returns the job."""

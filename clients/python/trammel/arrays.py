@@ -125,7 +125,7 @@ class Frame:
         return None if values.isna().all() else branches(values.to_numpy())
 
     def circumstances(self, given: Dict[str, Any]) -> Dict[str, Any]:
-        """`tool`, `payload`, `directions`, `temperature_c`: as given, else what the columns say for all rows."""
+        """`tool`, `payload`, `directions`, `temperature_c`: as given, else what the columns say for all rows: those of one part."""
         said = dict(given)
         for column, argument in _ONE_FOR_ALL.items():
             value = self._same(column)
@@ -134,17 +134,25 @@ class Frame:
             if given[argument] not in (None, "", value):
                 raise Usage(f"{self._argument}: {argument} is {given[argument]!r}, but column {column} says {value!r}")
             said[argument] = value
-        turns = [name for name in self._columns if re.fullmatch(r"dir[0-9]+", name)]
+        turns = self._turns()
         if turns and not given["directions"]:
-            said["directions"] = [int(self._same(name) or 0) for name in sorted(turns, key=lambda name: int(name[3:]))]
+            said["directions"] = [int(self._same(name) or 0) for name in turns]
         return said
 
+    def parts(self, given: Dict[str, Any]) -> List[npt.NDArray[np.intp]]:
+        """Positions of the rows that say the same `circumstances()`, which one call has in common."""
+        said = [name for name in _ONE_FOR_ALL if name in self._columns] + ([] if given["directions"] else self._turns())
+        if not said or len(self._table) < 2:
+            return [np.arange(len(self._table))]
+        numbers = self._table.groupby([self._columns[name] for name in said], sort=False, dropna=False).ngroup().to_numpy()
+        return [np.flatnonzero(numbers == number) for number in range(numbers.max() + 1)]
+
+    def _turns(self) -> List[str]:
+        return sorted((name for name in self._columns if re.fullmatch(r"dir[0-9]+", name)), key=lambda name: int(name[3:]))
+
     def _same(self, column: str) -> Any:
-        """Its one value; None where there is none. Raises `Usage` where rows differ: that needs a call for each."""
+        """Its value in the first row that has one; None where none has."""
         if column not in self._columns:
             return None
-        values = self._table[self._columns[column]]
-        found = values.dropna().unique()
-        if len(found) > 1 or (len(found) == 1 and values.isna().any()):
-            raise Usage(f"{self._argument}: the rows differ in {column}: ask for each part of the frame by itself (groupby)")
-        return found.tolist()[0] if len(found) == 1 else None
+        found = self._table[self._columns[column]].dropna()
+        return found.tolist()[0] if len(found) > 0 else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, List, Mapping, Optional
+from typing import Any, List, Mapping, Optional, Sequence
 
 __all__ = [
     "TrammelError", "Usage", "Refused", "NotFound", "Conflict", "TooLarge", "Busy", "Unreachable", "Internal",
@@ -33,6 +33,14 @@ class TrammelError(Exception):
 
     def __str__(self) -> str:
         return str(self.args[0])
+
+    def seen_in(self, rows: Sequence[int]) -> TrammelError:
+        """The same of a whole of which `rows` were asked."""
+        if self.row is None or not 0 <= self.row < len(rows):
+            return self
+        row = int(rows[self.row])
+        sentence = str(self).replace(f"row {self.row}", f"row {row}", 1)
+        return type(self)(sentence, {**(self.args[1] or {}), "row": row})
 
 
 class Usage(TrammelError):
