@@ -123,6 +123,15 @@ struct StatedType {
   int line = 0;
 };
 
+/// An axis that follows another one, as its controller's files state it.
+struct StatedCoupling {
+  int axis = 0;      ///< of the turning ones, from 0
+  std::string name;  ///< `coupled_upper_joint_bound`
+  std::string text;  ///< its value
+  std::string file;
+  int line = 0;
+};
+
 /// A target that may be corrected.
 struct ProgramTarget {
   std::string name;          ///< `p10`, or how it is computed: `Offs(p10,0,0,50)`
@@ -204,6 +213,7 @@ struct StatedRobot {
   std::vector<StatedBase> bases;  ///< the first holds
   std::vector<StatedNumber> numbers;
   std::vector<StatedType> types;
+  std::vector<StatedCoupling> couplings;
 };
 
 struct Program : StatedRobot {

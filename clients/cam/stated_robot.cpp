@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <set>
 
+#include "clients/cam/number_text.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
 #include "server/robot/inverse_kinematics.h"
@@ -19,6 +21,7 @@ constexpr double kSamePlace = 1e-5;   // m
 constexpr double kSameTurn = 9e-5;    // rad, 0.005 deg
 constexpr double kSameLength = 1e-4;  // m: both are the drawing's
 constexpr std::size_t kFewest = 3;    // digits of a reach: R2700, R900
+constexpr double kSameReach = 0.06;   // m: 0.58 is also called 0.6
 
 bool same_base(const Pose& a, const Pose& b) {
   return (a.translation() - b.translation()).norm() <= kSamePlace &&
@@ -130,6 +133,45 @@ std::string abb_model(const std::string& type) {
   return type.substr(first, std::min(type.find_first_not_of("0123456789", first), type.size()) - first);
 }
 
+/// m, of `ROB1_6640_2.75_205` and of `IRB 6640-205/2.75`: the number with a point; 0: there is none.
+double abb_reach(const std::string& type) {
+  const std::size_t point = type.find('.');
+  if (point == std::string::npos || point == 0) return 0;
+  const std::size_t before = type.find_last_not_of("0123456789", point - 1);
+  const std::size_t first = before == std::string::npos ? 0 : before + 1;
+  const std::size_t end = std::min(type.find_first_not_of("0123456789", point + 1), type.size());
+  const auto reach = read_number(std::string_view(type).substr(first, end - first));
+  return reach ? reach->value : 0;
+}
+
+/// The coupling of a turning axis in the robot file; nullptr: it follows no other.
+const Coupling* coupling_of(const Chain& robot, int axis) {
+  for (int j = 0; j < robot.size(); ++j) {
+    if (robot.joint(j).type != JointType::kRevolute || axis-- != 0) continue;
+    for (const Coupling& coupling : robot.couplings()) {
+      if (coupling.joint == j) return &coupling;
+    }
+  }
+  return nullptr;
+}
+
+/// ABB's arms whose axis 3 is held by bars.
+bool has_bars(const std::string& abb) {
+  static const std::set<std::string> kModels = {"1400", "1410", "2400", "4400", "4450", "6660"};
+  return kModels.contains(abb);
+}
+
+std::optional<Error> contradiction(const StatedCoupling& stated, const Chain& robot) {
+  if (coupling_of(robot, stated.axis) != nullptr) return std::nullopt;
+  return refused("{} {} says that axis {} follows another one, the robot file of {} has no coupling of it", stated.name,
+                 shown(stated.text), stated.axis + 1, shown(robot.name()))
+      .in(stated.file)
+      .at_row(stated.line)
+      .of(stated.name)
+      .next("correct with the model of the robot that this controller moves")
+      .value();
+}
+
 /// KUKA's types say load and reach, KR 210 R2700. Words beside them are spelled in many ways.
 std::optional<Error> contradiction(const StatedType& stated, const Chain& robot) {
   const std::string theirs = upper(stated.type), ours = upper(robot.name());
@@ -138,7 +180,23 @@ std::optional<Error> contradiction(const StatedType& stated, const Chain& robot)
     return !a.empty() && !b.empty() && a != b;
   };
   const std::string abb = abb_model(theirs), irb = digits_behind(ours, "IRB", 2);
-  const bool other_abb = !abb.empty() && !irb.empty() && abb != irb;
+  const bool both_abb = !abb.empty() && !irb.empty();
+  const double reach = abb_reach(theirs), our_reach = abb_reach(ours);
+  const bool other_reach = both_abb && reach > 0 && our_reach > 0 && std::abs(reach - our_reach) > kSameReach;
+  const bool other_abb = (both_abb && abb != irb) || other_reach;
+  if (!other_abb && has_bars(abb)) {
+    const Coupling* coupling = coupling_of(robot, 2);
+    if (coupling == nullptr || coupling->kind != CouplingKind::kParallelogram)
+      return refused("{} says {}, an arm whose axis 3 is held by bars, the robot file of {} has {}", stated.name,
+                     shown(stated.type), shown(robot.name()),
+                     coupling == nullptr ? "no coupling of it" : "a coupling of kind controller")
+          .in(stated.file)
+          .at_row(stated.line)
+          .of(stated.name)
+          .with_text(stated.type)
+          .next("give the robot file the coupling of axis 3 with kind: parallelogram")
+          .value();
+  }
   if (!other_abb && !differ("KR", 1) && !differ("R", kFewest)) return std::nullopt;
   return refused("{} says {}, the robot file is of {}", stated.name, shown(stated.type), shown(robot.name()))
       .in(stated.file)
@@ -155,6 +213,7 @@ void take_stated(const StatedRobot& stated, StatedRobot& all) {
   all.bases.insert(all.bases.end(), stated.bases.begin(), stated.bases.end());
   all.numbers.insert(all.numbers.end(), stated.numbers.begin(), stated.numbers.end());
   all.types.insert(all.types.end(), stated.types.begin(), stated.types.end());
+  all.couplings.insert(all.couplings.end(), stated.couplings.begin(), stated.couplings.end());
 }
 
 void stand_in_world(Program& program, const ReadOptions& options) {
@@ -186,6 +245,7 @@ Status check_stated_robot(const Program& program, const Chain& robot) {
   };
   for (const StatedNumber& number : program.numbers) add(contradiction(number, robot));
   for (const StatedType& type : program.types) add(contradiction(type, robot));
+  for (const StatedCoupling& coupling : program.couplings) add(contradiction(coupling, robot));
   if (!problems.empty()) return tl::make_unexpected(together(std::move(problems)));
   return {};
 }

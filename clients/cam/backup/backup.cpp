@@ -61,6 +61,7 @@ class Backup {
     cell_.file = where_;
     cell_.line = (*robot)->line;
     cell_.axes = axes_of(**robot);
+    find_couplings(**robot);
     for (const Status& read : {read_base(**robot), read_limits(**robot)}) {
       if (!read) return tl::make_unexpected(read.error());
     }
@@ -98,6 +99,33 @@ class Backup {
     int named = 0;
     for (std::size_t k = 0; k < kAxes; ++k) named += robot.text(fmt::format("use_joint_{}", k)).empty() ? 0 : 1;
     return named >= kFewest ? named : 0;
+  }
+
+  /// The parameters of an axis: its JOINT, and its ARM, which has the bounds.
+  [[nodiscard]] std::vector<const ParameterInstance*> parameters_of(const ParameterInstance& robot,
+                                                                    std::size_t axis) const {
+    const std::string name = robot.text(fmt::format("use_joint_{}", axis));
+    if (name.empty()) return {};
+    const ParameterInstance* joint = named(instances_, "JOINT", name);
+    const std::string used = joint != nullptr ? joint->text("use_arm") : "";
+    std::vector<const ParameterInstance*> found = {named(instances_, "ARM", used.empty() ? name : used), joint};
+    found.erase(std::remove(found.begin(), found.end(), nullptr), found.end());
+    return found;
+  }
+
+  /// `-coupled_upper_joint_bound 1.2`: bounds that depend on another axis are those of a parallel arm.
+  void find_couplings(const ParameterInstance& robot) {
+    static const std::set<std::string> kNot = {"",    "0",   "no",    "No",    "NO",   "off",
+                                               "Off", "OFF", "false", "False", "FALSE"};
+    for (std::size_t k = 0; k < kAxes; ++k) {
+      for (const ParameterInstance* of : parameters_of(robot, k)) {
+        for (const auto& [name, value] : of->values) {
+          const bool coupled = name.find("coupl") != std::string::npos || name.find("parallel") != std::string::npos;
+          if (coupled && !kNot.contains(value))
+            cell_.couplings.push_back({static_cast<int>(k), name, value, where_, of->line});
+        }
+      }
+    }
   }
 
   /// The number of an attribute; `otherwise` where it is left at what the controller takes by default.
@@ -142,11 +170,8 @@ class Backup {
 
   Status read_limits(const ParameterInstance& robot) {
     for (std::size_t k = 0; k < kAxes; ++k) {
-      const std::string joint_name = robot.text(fmt::format("use_joint_{}", k));
-      const ParameterInstance* joint = named(instances_, "JOINT", joint_name);
-      const std::string arm_name =
-          joint != nullptr && !joint->text("use_arm").empty() ? joint->text("use_arm") : joint_name;
-      const ParameterInstance* arm = joint_name.empty() ? nullptr : named(instances_, "ARM", arm_name);
+      const std::vector<const ParameterInstance*> all = parameters_of(robot, k);
+      const ParameterInstance* arm = all.empty() || all[0]->type != "ARM" ? nullptr : all[0];
       if (arm == nullptr || !arm->values.contains("upper_joint_bound") || !arm->values.contains("lower_joint_bound")) {
         cell_.notes.push_back(
             fmt::format("the bounds of axis {} are not in the parameters: no ranges are taken", k + 1));
@@ -336,6 +361,7 @@ StatedRobot stated_by(const ControllerRobot& robot) {
   if (robot.axes > 0)
     stated.numbers.push_back({ArmNumber::kAxes, static_cast<double>(robot.axes), "use_joint", robot.file, robot.line});
   if (!robot.robot_type.empty()) stated.types.push_back({robot.robot_type, "use_robot_type", robot.file, robot.line});
+  stated.couplings = robot.couplings;
   return stated;
 }
 

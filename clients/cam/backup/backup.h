@@ -20,6 +20,7 @@ struct ControllerRobot {
   int line = 0;                                   ///< of the robot in them
   int axes = 0;                                   ///< that it names; 0: not known
   Pose X_WB = Pose::Identity();                   ///< base frame, seen from the controller's world
+  std::vector<StatedCoupling> couplings;          ///< axes that follow another one
   std::string carried_by;                         ///< the unit that moves the base frame; empty: none does
   std::vector<std::pair<double, double>> limits;  ///< rad, of each axis; empty where the parameters do not say all
   bool controller_compensates = false;            ///< Absolute Accuracy is in use
