@@ -64,6 +64,7 @@ const std::vector<Reserved> kReserved = {
     {"the YAML reader", std::regex("^server/base/yaml_file\\.h$"),
      std::regex("^server/config/.*|^(server|clients)/.*_file\\.(h|cpp)$")},
     {"SQLite", std::regex("^(sqlite3\\.h|SQLiteCpp/.*)$"), std::regex("^server/store/.*")},
+    {"libpq", std::regex("^postgresql/libpq-fe\\.h$"), std::regex("^server/store/database/.*")},
     {"the HTTP library", std::regex("^httplib\\.h$"), std::regex("^server/http/.*")},
     {"Prometheus", std::regex("^prometheus/.*"), std::regex("^server/http/.*")},
     {"spdlog and systemd", std::regex("^(spdlog|systemd)/.*"), std::regex("^server/host/.*")},

@@ -4,31 +4,14 @@
 
 #include "server/base/unix_time.h"
 #include "server/store/file_header.h"
+#include "server/store/schema_text.h"
 #include "server/store/statements.h"
 
 namespace trammel {
 namespace {
 
+constexpr const char* kEnd = "SELECT rows, hash FROM audit_end";
 constexpr int kRowsAtOnce = 2000;  // others use the store in between
-
-constexpr const char* kTables = R"sql(
-CREATE TABLE audit (
-  number      INTEGER PRIMARY KEY,
-  at          INTEGER NOT NULL,
-  who         TEXT    NOT NULL,
-  cell        TEXT    NOT NULL,
-  what        TEXT    NOT NULL,
-  subject     TEXT    NOT NULL,
-  before      TEXT    NOT NULL,
-  after       TEXT    NOT NULL,
-  why         TEXT    NOT NULL,
-  request     TEXT    NOT NULL,
-  hash_before TEXT    NOT NULL,
-  hash        TEXT    NOT NULL
-);
-CREATE TABLE audit_end (rows INTEGER NOT NULL, hash TEXT NOT NULL);
-INSERT INTO audit_end (rows, hash) VALUES (0, '');
-)sql";
 
 /// How the trail ends, as it was written with its last row.
 struct End {
@@ -36,77 +19,76 @@ struct End {
   std::string hash;
 };
 
-End end_of(SQLite::Database& database) {
-  SQLite::Statement row(database, "SELECT rows, hash FROM audit_end");
-  if (!row.executeStep()) return {};
-  return {row.getColumn(0).getInt64(), row.getColumn(1).getString()};
+End end_of(Database& database, const std::string& sql = kEnd) {
+  Rows row = prepare(database, sql.c_str());
+  if (!row.next()) return {};
+  return {row.integer64(0), row.text(1)};
 }
 
-AuditRow row_of(SQLite::Statement& row) {
-  const auto text = [&row](int column) { return row.getColumn(column).getString(); };
-  return {row.getColumn(0).getInt64(),
-          row.getColumn(1).getInt64(),
-          text(2),
-          text(3),
-          text(4),
-          text(5),
-          text(6),
-          text(7),
-          text(8),
-          text(9),
-          text(10),
-          text(11)};
+AuditRow row_of(Rows& row) {
+  const auto text = [&row](int column) { return row.text(column); };
+  return {row.integer64(0), row.integer64(1), text(2), text(3), text(4),  text(5),
+          text(6),          text(7),          text(8), text(9), text(10), text(11)};
 }
 
 }  // namespace
 
-void record_audit(SQLite::Database& database, const AuditEntry& entry, const ChangeId& by) {
-  const End end = end_of(database);
+namespace {
+
+void append(Database& database, const AuditEntry& entry, const ChangeId& by) {
+  const End end = end_of(database, locked(database, kEnd));
   AuditRow row{
       end.rows + 1, unix_now(),  by.who.empty() ? "service" : by.who,       entry.cell, entry.what, entry.subject,
       entry.before, entry.after, entry.why.empty() ? by.reason : entry.why, by.id,      end.hash,   {}};
   row.hash = hash_of(row);
   change(database,
          "INSERT INTO audit (number, at, who, cell, what, subject, before, after, why, request, hash_before, hash) "
-         "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+         "VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12)",
          row.number, row.at, row.who, row.cell, row.what, row.subject, row.before, row.after, row.why, row.request,
          row.hash_before, row.hash);
-  change(database, "UPDATE audit_end SET rows = ?, hash = ?", row.number, row.hash);
+  change(database, "UPDATE audit_end SET rows = $1, hash = $2", row.number, row.hash);
 }
 
-void prepare_audit(SQLite::Database& database, bool is_new, int schema_before) {
-  if (database.tableExists("audit")) return;
-  database.exec(kTables);
+}  // namespace
+
+void record_audit(Database& database, const AuditEntry& entry, const ChangeId& by) {
+  // Every change waits for the end of the trail: it is locked last, and until the commit only.
+  database.at_end([entry, by](Database& open) { append(open, entry, by); });
+}
+
+void prepare_audit(Database& database, bool is_new, std::int64_t schema_before) {
+  if (database.has_table("audit")) return;
+  database.execute(in_sqlite(kAuditTables));
   if (is_new) {
     record_audit(database, {"", "store", "store", "", fmt::format("schema {}", kSchemaVersion)});
     return;
   }
   const auto count = [&database](const char* table) {
-    return database.execAndGet(std::string("SELECT COUNT(*) FROM ") + table).getInt64();
+    return integer_of(database, (std::string("SELECT COUNT(*) FROM ") + table).c_str());
   };
   record_audit(database, {"", "migrate", "store", fmt::format("schema {}, no audit trail", schema_before),
                           fmt::format("schema {} with {} batches, {} models, {} activations", kSchemaVersion,
                                       count("batches"), count("models"), count("activations"))});
 }
 
-std::int64_t last_audit_at(SQLite::Database& database) {
+std::int64_t last_audit_at(Database& database) {
   try {
-    SQLite::Statement row(database, "SELECT at FROM audit ORDER BY number DESC LIMIT 1");
-    return row.executeStep() ? row.getColumn(0).getInt64() : 0;
-  } catch (const SQLite::Exception&) {
+    Rows row = prepare(database, "SELECT at FROM audit ORDER BY number DESC LIMIT 1");
+    return row.next() ? row.integer64(0) : 0;
+  } catch (const DatabaseError&) {
     return 0;
   }
 }
 
-std::int64_t audit_rows(SQLite::Database& database) { return end_of(database).rows; }
+std::int64_t audit_rows(Database& database) { return end_of(database).rows; }
 
-bool read_more(SQLite::Database& database, const AuditQuery& query, AuditChain& chain, AuditTrail& trail) {
+bool read_more(Database& database, const AuditQuery& query, AuditChain& chain, AuditTrail& trail) {
   auto rows = prepare(database,
                       "SELECT number, at, who, cell, what, subject, before, after, why, request, hash_before, hash "
-                      "FROM audit WHERE number > ? ORDER BY number LIMIT ?",
+                      "FROM audit WHERE number > $1 ORDER BY number LIMIT $2",
                       chain.rows(), kRowsAtOnce);
   bool any = false;
-  while (!trail.broken && rows.executeStep()) {
+  while (!trail.broken && rows.next()) {
     any = true;
     AuditRow row = row_of(rows);
     if (const Status good = chain.add(row); !good) trail.broken = good.error();

@@ -1,11 +1,10 @@
 #pragma once
 
-#include <SQLiteCpp/SQLiteCpp.h>
-
 #include <string>
 
 #include "server/store/audit.h"
 #include "server/store/change_id.h"
+#include "server/store/database/database.h"
 
 /// The audit trail, for the transactions that change something.
 namespace trammel {
@@ -16,19 +15,19 @@ struct AuditEntry {
   std::string why = {};
 };
 
-/// Appends it to the trail, in the transaction that is open. `by`: who asked for it, and under which id.
-void record_audit(SQLite::Database& database, const AuditEntry& entry, const ChangeId& by = {});
+/// Appends it to the trail at the end of the transaction that is open. `by`: who asked for it, and under which id.
+void record_audit(Database& database, const AuditEntry& entry, const ChangeId& by = {});
 
 /// Makes the trail where there is none, and records how it began.
-void prepare_audit(SQLite::Database& database, bool is_new, int schema_before);
+void prepare_audit(Database& database, bool is_new, std::int64_t schema_before);
 
 /// When the last row was written, as the clock stood then (Unix time, s); 0: there is none that can be read.
-[[nodiscard]] std::int64_t last_audit_at(SQLite::Database& database);
+[[nodiscard]] std::int64_t last_audit_at(Database& database);
 
 /// How many rows the trail has.
-[[nodiscard]] std::int64_t audit_rows(SQLite::Database& database);
+[[nodiscard]] std::int64_t audit_rows(Database& database);
 
 /// Takes the next rows into the chain and, as far as they are asked for, into the trail; false: there are no more.
-[[nodiscard]] bool read_more(SQLite::Database& database, const AuditQuery& query, AuditChain& chain, AuditTrail& trail);
+[[nodiscard]] bool read_more(Database& database, const AuditQuery& query, AuditChain& chain, AuditTrail& trail);
 
 }  // namespace trammel

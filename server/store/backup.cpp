@@ -18,6 +18,7 @@
 #include "server/store/file_header.h"
 #include "server/store/open_database.h"
 #include "server/store/schema.h"
+#include "server/store/statements.h"
 
 namespace trammel {
 namespace {
@@ -53,16 +54,14 @@ Status on_disk(const std::string& path) {
       .next(kElsewhere);
 }
 
-Status check_is_store(SQLite::Database& database, const std::string& path) {
-  if (database.execAndGet("PRAGMA application_id").getInt() == kApplicationId) return {};
+Status check_is_store(Database& database, const std::string& path) {
+  if (integer_of(database, "PRAGMA application_id") == kApplicationId) return {};
   return refused("no store").in(path);
 }
 
-std::int64_t count(SQLite::Database& database, const char* sql) { return database.execAndGet(sql).getInt64(); }
-
 /// The trail as a whole, as `read_audit()` verifies it.
-Status check_trail(SQLite::Database& database, StoreCopy& copy) {
-  if (!database.tableExists("audit")) return {};  // of before there was one
+Status check_trail(Database& database, StoreCopy& copy) {
+  if (!database.has_table("audit")) return {};  // of before there was one
   AuditChain chain;
   AuditTrail trail;
   const AuditQuery last{"", 0, 1};
@@ -77,8 +76,8 @@ Failure damaged(const std::string& what, const std::string& path) {
   return failure(ErrorCode::kInternal, "damaged: {}", what).in(path).next("take an older copy");
 }
 
-Status check_size(SQLite::Database& database, const std::string& path) {
-  const std::int64_t expected = count(database, "PRAGMA page_size") * count(database, "PRAGMA page_count");
+Status check_size(Database& database, const std::string& path) {
+  const std::int64_t expected = integer_of(database, "PRAGMA page_size") * integer_of(database, "PRAGMA page_count");
   std::error_code error;
   const auto size = static_cast<std::int64_t>(fs::file_size(path, error));
   if (!error && size == expected) return {};
@@ -86,45 +85,42 @@ Status check_size(SQLite::Database& database, const std::string& path) {
 }
 
 /// Every batch is what was accepted; of one that was pruned the text is gone.
-Status check_batches(SQLite::Database& database, const std::string& path) {
-  SQLite::Statement rows(database, "SELECT cell, id, csv, hash FROM batches WHERE csv <> ''");
-  while (rows.executeStep()) {
-    if (sha256_hex(rows.getColumn(2).getString()) == rows.getColumn(3).getString()) continue;
-    return damaged(fmt::format("batch {} of cell {} is not what was accepted", rows.getColumn(1).getString(),
-                               rows.getColumn(0).getString()),
-                   path);
+Status check_batches(Database& database, const std::string& path) {
+  Rows rows = prepare(database, "SELECT cell, id, csv, hash FROM batches WHERE csv <> ''");
+  while (rows.next()) {
+    if (sha256_hex(rows.text(2)) == rows.text(3)) continue;
+    return damaged(fmt::format("batch {} of cell {} is not what was accepted", rows.text(1), rows.text(0)), path);
   }
   return {};
 }
 
 /// Every model is what was stored, by its own hashes and by that beside it.
-Status check_models(SQLite::Database& database, const std::string& path) {
-  SQLite::Statement rows(database, "SELECT cell, version, hash, content FROM models WHERE content <> ''");
-  while (rows.executeStep()) {
-    const std::string name =
-        fmt::format("version {} of cell {}", rows.getColumn(1).getInt(), rows.getColumn(0).getString());
-    const auto hash = undamaged_hash(rows.getColumn(3).getString(), name);
+Status check_models(Database& database, const std::string& path) {
+  Rows rows = prepare(database, "SELECT cell, version, hash, content FROM models WHERE content <> ''");
+  while (rows.next()) {
+    const std::string name = fmt::format("version {} of cell {}", rows.integer(1), rows.text(0));
+    const auto hash = undamaged_hash(rows.text(3), name);
     if (!hash) return damaged(fmt::format("{}: {}", name, hash.error().message), path);
-    if (*hash != rows.getColumn(2).getString()) return damaged(name + " is not the model that was stored", path);
+    if (*hash != rows.text(2)) return damaged(name + " is not the model that was stored", path);
   }
   return {};
 }
 
-Status check_texts(SQLite::Database& database, const std::string& path) {
+Status check_texts(Database& database, const std::string& path) {
   const Status batches = check_batches(database, path);
   return batches ? check_models(database, path) : batches;
 }
 
-Result<StoreCopy> checked(SQLite::Database& database, const std::string& path) {
+Result<StoreCopy> checked(Database& database, const std::string& path) {
   if (const Status ours = check_is_store(database, path); !ours) return tl::make_unexpected(ours.error());
-  const std::string pages = database.execAndGet("PRAGMA integrity_check(1)").getString();
+  const std::string pages = text_of(database, "PRAGMA integrity_check(1)");
   if (pages != "ok") return failure(ErrorCode::kInternal, "damaged: {}", pages).in(path);
   if (const Status whole = check_size(database, path); !whole) return tl::make_unexpected(whole.error());
   if (const Status whole = check_texts(database, path); !whole) return tl::make_unexpected(whole.error());
   StoreCopy copy;
   if (const auto mark = mark_of(database)) copy.identity = mark->identity;
-  copy.models = count(database, "SELECT COUNT(*) FROM models");
-  copy.batches = count(database, "SELECT COUNT(*) FROM batches");
+  copy.models = integer_of(database, "SELECT COUNT(*) FROM models");
+  copy.batches = integer_of(database, "SELECT COUNT(*) FROM batches");
   std::error_code error;
   copy.bytes = static_cast<std::int64_t>(fs::file_size(path, error));
   if (const Status whole = check_trail(database, copy); !whole) return Failure(whole.error()).in(path);
@@ -133,16 +129,18 @@ Result<StoreCopy> checked(SQLite::Database& database, const std::string& path) {
 
 /// Copies one moment of it: what is read is held for as long as the transaction is open.
 Status copy_pages(const std::string& from, const std::string& to, const std::function<void(double)>& progress) {
-  SQLite::Database source(uri_to_look_at(from), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
-  const SQLite::Transaction moment(source);
+  SqliteDatabase source(uri_to_look_at(from), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
+  const Transaction moment(source, Transaction::For::kReading);
   if (const Status ours = check_is_store(source, from); !ours) return ours;
-  SQLite::Database target(to, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout);
-  SQLite::Backup backup(target, source);
-  while (backup.executeStep(kPagesAtOnce) != SQLITE_DONE) {
-    const int total = backup.getTotalPageCount();
-    if (progress && total > 0) progress(1 - static_cast<double>(backup.getRemainingPageCount()) / total);
-  }
-  return {};
+  SqliteDatabase target(to, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout);
+  return with_our_errors([&]() -> Status {
+    SQLite::Backup backup(target.file(), source.file());
+    while (backup.executeStep(kPagesAtOnce) != SQLITE_DONE) {
+      const int total = backup.getTotalPageCount();
+      if (progress && total > 0) progress(1 - static_cast<double>(backup.getRemainingPageCount()) / total);
+    }
+    return {};
+  });
 }
 
 Status check_is_new(const std::string& path) {
@@ -165,7 +163,7 @@ Result<StoreCopy> back_up_store(const std::string& from, const std::string& to,
   try {
     if (const Status copied = copy_pages(from, part, progress); !copied) return tl::make_unexpected(copied.error());
     copy = check_store_copy(part);
-  } catch (const SQLite::Exception& error) {
+  } catch (const DatabaseError& error) {
     return failure(ErrorCode::kInternal, "cannot be copied to {}: {}", to, error.what()).in(from);
   }
   if (!copy) return copy;
@@ -180,9 +178,9 @@ Result<StoreCopy> back_up_store(const std::string& from, const std::string& to,
 
 Result<StoreCopy> check_store_copy(const std::string& path) {
   try {
-    SQLite::Database database(immutable_uri(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
+    SqliteDatabase database(immutable_uri(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
     return checked(database, path);
-  } catch (const SQLite::Exception& error) {
+  } catch (const DatabaseError& error) {
     return failure(ErrorCode::kInternal, "cannot be read: {}", error.what()).in(path);
   }
 }

@@ -2,6 +2,7 @@
 
 #include "server/base/hash.h"
 #include "server/store/audit_rows.h"
+#include "server/store/cell_rows.h"
 #include "server/store/changes.h"
 #include "server/store/connection.h"
 #include "server/store/job_rows.h"
@@ -13,11 +14,11 @@
 namespace trammel {
 namespace {
 
-/// Of the cell ?1. Without a reference to the row, so that it is read once.
+/// Of the cell $1. Without a reference to the row, so that it is read once.
 constexpr const char* kLearned =
     "SELECT job_batches.batch FROM job_batches JOIN jobs ON jobs.id = job_batches.job "
-    "WHERE jobs.cell = ?1 AND jobs.state = 'done' AND jobs.model_version > 0 "
-    "UNION SELECT batch FROM learned_elsewhere WHERE cell = ?1";
+    "WHERE jobs.cell = $1 AND jobs.state = 'done' AND jobs.model_version > 0 "
+    "UNION SELECT batch FROM learned_elsewhere WHERE cell = $1";
 
 const std::string& record_columns() {
   static const std::string columns = fmt::format(
@@ -29,33 +30,25 @@ const std::string& record_columns() {
       "id IN ({}), "
       "(SELECT CASE WHEN state IN ('queued', 'running') THEN '' WHEN message = '' THEN state "
       "ELSE message END FROM jobs WHERE jobs.id = batches.job) "
-      "FROM batches WHERE cell = ?1 ",
+      "FROM batches WHERE cell = $1 ",
       kLearned);
   return columns;
 }
 
 /// The batch in a row of record_columns(), without its text.
-StoredBatch record_of(const std::string& cell, SQLite::Statement& row) {
-  StoredBatch batch{cell,
-                    row.getColumn(0).getString(),
-                    "",
-                    row.getColumn(1).getString(),
-                    row.getColumn(2).getString(),
-                    row.getColumn(3).getInt64(),
-                    row.getColumn(4).getInt(),
-                    row.getColumn(5).getInt64(),
-                    row.getColumn(6).getString()};
-  batch.pruned = row.getColumn(7).getInt() != 0;
-  batch.discarded = row.getColumn(8).getInt() != 0;
-  batch.learned = row.getColumn(9).getInt() != 0;
-  batch.outcome = row.getColumn(10).getString();
+StoredBatch record_of(const std::string& cell, Rows& row) {
+  StoredBatch batch{cell,           row.text(0),      "",         row.text(1), row.text(2), row.integer64(3),
+                    row.integer(4), row.integer64(5), row.text(6)};
+  batch.pruned = row.truth(7);
+  batch.discarded = row.truth(8);
+  batch.learned = row.truth(9);
+  batch.outcome = row.text(10);
   return batch;
 }
 
-Result<StoredBatch> read_record(SQLite::Database& database, const std::string& cell, const std::string& id) {
-  auto row = prepare(database, (record_columns() + "AND id = ?2").c_str(), cell, id);
-  if (!row.executeStep())
-    return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id).of("batch").with_text(id);
+Result<StoredBatch> read_record(Database& database, const std::string& cell, const std::string& id) {
+  auto row = prepare(database, (record_columns() + "AND id = $2").c_str(), cell, id);
+  if (!row.next()) return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id).of("batch").with_text(id);
   return record_of(cell, row);
 }
 
@@ -81,11 +74,12 @@ Failure discarded_failure(const std::string& cell, const std::string& id) {
 }
 
 Result<StoredJob> Store::add_batch(const StoredBatch& batch, const StoredJob& job) {
-  return connection_->in_transaction([&](SQLite::Database& database) -> Result<StoredJob> {
-    auto present = prepare(database, "SELECT hash, job FROM batches WHERE cell = ? AND id = ?", batch.cell, batch.id);
-    if (present.executeStep()) {
-      const bool same_content = present.getColumn(0).getString() == batch.hash;
-      const std::int64_t made = present.getColumn(1).getInt64();
+  return connection_->in_transaction([&](Database& database) -> Result<StoredJob> {
+    lock_cell(database, batch.cell);
+    auto present = prepare(database, "SELECT hash, job FROM batches WHERE cell = $1 AND id = $2", batch.cell, batch.id);
+    if (present.next()) {
+      const bool same_content = present.text(0) == batch.hash;
+      const std::int64_t made = present.integer64(1);
       // A repeat, or a client that lost its receipt.
       if (same_content) return read_job(database, made);
       return other_content(batch, made);
@@ -93,7 +87,7 @@ Result<StoredJob> Store::add_batch(const StoredBatch& batch, const StoredJob& jo
     const std::int64_t id = insert_job(database, job);
     change(database,
            "INSERT INTO batches (cell, id, csv, hash, request_id, accepted_at, poses, job) "
-           "VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+           "VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
            batch.cell, batch.id, batch.csv, batch.hash, batch.request_id, batch.accepted_at, batch.poses, id);
     insert_job_batches(database, id, batch.cell, {batch.id});
     record_audit(database,
@@ -106,7 +100,7 @@ Result<StoredJob> Store::add_batch(const StoredBatch& batch, const StoredJob& jo
 
 Status Store::set_quarantine(const std::string& cell, const std::string& id, const std::string& reason,
                              const ChangeId& change_id) {
-  const auto changed = connection_->in_transaction([&](SQLite::Database& database) {
+  const auto changed = connection_->in_transaction([&](Database& database) {
     return once(database, cell, change_id, [&]() -> Result<ChangeOutcome> {
       const auto batch = read_record(database, cell, id);
       if (!batch) return tl::make_unexpected(batch.error());
@@ -118,7 +112,7 @@ Status Store::set_quarantine(const std::string& cell, const std::string& id, con
             .with_text(id)
             .next("nothing is to be released; trammel retrain trains from it");
       if (batch->quarantine == reason) return ChangeOutcome{};
-      change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", reason, cell, id);
+      change(database, "UPDATE batches SET quarantine = $1 WHERE cell = $2 AND id = $3", reason, cell, id);
       record_audit(
           database,
           {cell, reason.empty() ? "release" : "quarantine", "batch " + id, spoken(batch->quarantine), spoken(reason)},
@@ -130,14 +124,14 @@ Status Store::set_quarantine(const std::string& cell, const std::string& id, con
 }
 
 Status Store::discard(const std::string& cell, const std::string& id, const ChangeId& change_id) {
-  const auto changed = connection_->in_transaction([&](SQLite::Database& database) {
+  const auto changed = connection_->in_transaction([&](Database& database) {
     return once(database, cell, change_id, [&]() -> Result<ChangeOutcome> {
       const auto batch = read_record(database, cell, id);
       if (!batch) return tl::make_unexpected(batch.error());
       if (batch->discarded) return ChangeOutcome{};
       const std::string now = "discarded" + (change_id.reason.empty() ? "" : ": " + change_id.reason);
-      change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", now, cell, id);
-      change(database, "INSERT INTO discarded (cell, batch) VALUES (?, ?)", cell, id);
+      change(database, "UPDATE batches SET quarantine = $1 WHERE cell = $2 AND id = $3", now, cell, id);
+      change(database, "INSERT INTO discarded (cell, batch) VALUES ($1, $2)", cell, id);
       record_audit(database, {cell, "discard", "batch " + id, spoken(batch->quarantine), now}, change_id);
       return ChangeOutcome{};
     });
@@ -146,7 +140,8 @@ Status Store::discard(const std::string& cell, const std::string& id, const Chan
 }
 
 Status Store::take_over_batch(const StoredBatch& there, const ChangeId& by) {
-  return connection_->in_transaction([&](SQLite::Database& database) -> Status {
+  return connection_->in_transaction([&](Database& database) -> Status {
+    lock_cell(database, there.cell);
     const auto here = read_record(database, there.cell, there.id);
     if (!here) return tl::make_unexpected(here.error());
     // What keeps it out is that it has a reason, whatever that says.
@@ -157,13 +152,14 @@ Status Store::take_over_batch(const StoredBatch& there, const ChangeId& by) {
       record_audit(database, {there.cell, what, "batch " + there.id, before, after}, by);
     };
     if (there.learned && !here->learned) {
-      change(database, "INSERT INTO learned_elsewhere (cell, batch) VALUES (?, ?)", there.cell, there.id);
+      change(database, "INSERT INTO learned_elsewhere (cell, batch) VALUES ($1, $2)", there.cell, there.id);
       record("follow", "", "a model was made of it");
     }
     if (there.discarded && !here->discarded)
-      change(database, "INSERT INTO discarded (cell, batch) VALUES (?, ?)", there.cell, there.id);
+      change(database, "INSERT INTO discarded (cell, batch) VALUES ($1, $2)", there.cell, there.id);
     if (quarantine == here->quarantine) return {};
-    change(database, "UPDATE batches SET quarantine = ? WHERE cell = ? AND id = ?", quarantine, there.cell, there.id);
+    change(database, "UPDATE batches SET quarantine = $1 WHERE cell = $2 AND id = $3", quarantine, there.cell,
+           there.id);
     record(there.discarded      ? "discard"
            : quarantine.empty() ? "release"
                                 : "quarantine",
@@ -173,13 +169,13 @@ Status Store::take_over_batch(const StoredBatch& there, const ChangeId& by) {
 }
 
 Result<StoredBatch> Store::batch(const std::string& cell, const std::string& id) const {
-  auto batch = connection_->exclusively([&](SQLite::Database& database) -> Result<StoredBatch> {
+  auto batch = connection_->exclusively([&](Database& database) -> Result<StoredBatch> {
     auto record = read_record(database, cell, id);
     if (!record) return record;
     if (record->pruned) return pruned_failure(fmt::format("batch {} of cell {}", id, cell)).of("batch").with_text(id);
-    auto row = prepare(database, "SELECT csv FROM batches WHERE cell = ? AND id = ?", cell, id);
-    if (!row.executeStep()) return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id);
-    record->csv = row.getColumn(0).getString();
+    auto row = prepare(database, "SELECT csv FROM batches WHERE cell = $1 AND id = $2", cell, id);
+    if (!row.next()) return failure(ErrorCode::kNotFound, "cell {} has no batch {}", cell, id);
+    record->csv = row.text(0);
     return record;
   });
   // Without the lock: hashing a large text takes a while.
@@ -192,23 +188,23 @@ Result<StoredBatch> Store::batch(const std::string& cell, const std::string& id)
 }
 
 Result<StoredBatch> Store::batch_record(const std::string& cell, const std::string& id) const {
-  return connection_->exclusively([&](SQLite::Database& database) { return read_record(database, cell, id); });
+  return connection_->exclusively([&](Database& database) { return read_record(database, cell, id); });
 }
 
 Result<std::vector<StoredBatch>> Store::batches(const std::string& cell) const {
-  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::vector<StoredBatch>> {
+  return connection_->exclusively([&](Database& database) -> Result<std::vector<StoredBatch>> {
     auto rows = prepare(database, (record_columns() + "ORDER BY number").c_str(), cell);
     std::vector<StoredBatch> batches;
-    while (rows.executeStep()) batches.push_back(record_of(cell, rows));
+    while (rows.next()) batches.push_back(record_of(cell, rows));
     return batches;
   });
 }
 
 Result<std::set<std::string>> Store::batches_learned_from(const std::string& cell) const {
-  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::set<std::string>> {
+  return connection_->exclusively([&](Database& database) -> Result<std::set<std::string>> {
     auto rows = prepare(database, kLearned, cell);
     std::set<std::string> ids;
-    while (rows.executeStep()) ids.insert(rows.getColumn(0).getString());
+    while (rows.next()) ids.insert(rows.text(0));
     return ids;
   });
 }

@@ -1,26 +1,25 @@
 #pragma once
 
-#include <SQLiteCpp/SQLiteCpp.h>
-
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "server/store/database/database.h"
 #include "server/store/store.h"
 
 /// Jobs as rows, for the transactions of batches, jobs and models.
 namespace trammel {
 
 /// Queues the job; its batches are not written yet.
-[[nodiscard]] std::int64_t insert_job(SQLite::Database& database, const StoredJob& job);
-void insert_job_batches(SQLite::Database& database, std::int64_t job, const std::string& cell,
+[[nodiscard]] std::int64_t insert_job(Database& database, const StoredJob& job);
+void insert_job_batches(Database& database, std::int64_t job, const std::string& cell,
                         const std::vector<std::string>& batch_ids);
 /// kConflict.
 [[nodiscard]] Failure discarded_failure(const std::string& cell, const std::string& id);
 /// kNotFound: there is none.
-[[nodiscard]] Result<StoredJob> read_job(SQLite::Database& database, std::int64_t id);
+[[nodiscard]] Result<StoredJob> read_job(Database& database, std::int64_t id);
 /// Marks an unfinished job of `cell` (empty: any) done; kNotFound: there is none.
-[[nodiscard]] Status end_job(SQLite::Database& database, std::int64_t id, const std::string& cell, int model_version,
+[[nodiscard]] Status end_job(Database& database, std::int64_t id, const std::string& cell, int model_version,
                              const std::string& message, const JobOutcome& outcome);
 
 }  // namespace trammel

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <limits>
 #include <string_view>
 #include <utility>
 
@@ -16,6 +17,7 @@
 namespace trammel {
 namespace {
 
+constexpr std::int64_t kAll = std::numeric_limits<std::int64_t>::max();  // rows
 constexpr int kPagesKept = 20;  // pages of diagnoses; findings are kept for ever
 
 constexpr std::array<std::pair<JobState, const char*>, 4> kJobStates = {{{JobState::kQueued, "queued"},
@@ -43,10 +45,10 @@ Status changed_one(int changes, std::int64_t id) {
   return failure(ErrorCode::kNotFound, "job {} does not exist or is finished", id).of("job").with_value(id);
 }
 
-std::vector<std::string> batches_of(SQLite::Database& database, std::int64_t job) {
-  auto rows = prepare(database, "SELECT batch FROM job_batches WHERE job = ? ORDER BY position", job);
+std::vector<std::string> batches_of(Database& database, std::int64_t job) {
+  auto rows = prepare(database, "SELECT batch FROM job_batches WHERE job = $1 ORDER BY position", job);
   std::vector<std::string> ids;
-  while (rows.executeStep()) ids.push_back(rows.getColumn(0).getString());
+  while (rows.next()) ids.push_back(rows.text(0));
   return ids;
 }
 
@@ -58,16 +60,16 @@ constexpr const char* kJobColumns =
     "FROM jobs LEFT JOIN job_times ON job_times.job = jobs.id LEFT JOIN job_outcomes ON job_outcomes.job = jobs.id ";
 
 /// The outcome in a row of kJobColumns.
-JobOutcome outcome_of(SQLite::Statement& row) {
+JobOutcome outcome_of(Rows& row) {
   JobOutcome outcome;
-  if (row.isColumnNull(12)) return outcome;
-  outcome.verdict = job_verdict_of(row.getColumn(12).getString()).value_or(JobVerdict::kOpen);
+  if (row.is_null(12)) return outcome;
+  outcome.verdict = job_verdict_of(row.text(12)).value_or(JobVerdict::kOpen);
   outcome.before = optional_number(row, 13);
   outcome.after = optional_number(row, 14);
   outcome.limit = optional_number(row, 15);
-  outcome.code = error_code_of(row.getColumn(16).getString());
-  outcome.why = row.getColumn(17).getString();
-  outcome.next = row.getColumn(18).getString();
+  outcome.code = error_code_of(row.text(16));
+  outcome.why = row.text(17);
+  outcome.next = row.text(18);
   outcome.peak_memory = optional_integer(row, 19);
   outcome.processor_time = optional_number(row, 20);
   return outcome;
@@ -80,18 +82,18 @@ JobKind job_kind_of(const std::string& text) {
   return text == "diagnose" ? JobKind::kDiagnose : text == "check" ? JobKind::kCheck : JobKind::kTrain;
 }
 
-StoredJob job_of(SQLite::Database& database, SQLite::Statement& row) {
+StoredJob job_of(Database& database, Rows& row) {
   StoredJob job;
-  job.id = row.getColumn(0).getInt64();
-  job.cell = row.getColumn(1).getString();
-  job.level = row.getColumn(2).getString();
-  job.bias = row.getColumn(3).getString();
-  job.state = job_state_of(row.getColumn(4).getString());
-  job.message = row.getColumn(5).getString();
-  job.created_at = row.getColumn(6).getInt64();
-  job.model_version = row.getColumn(7).getInt();
-  job.attempts = row.getColumn(8).getInt();
-  job.kind = job_kind_of(row.getColumn(9).getString());
+  job.id = row.integer64(0);
+  job.cell = row.text(1);
+  job.level = row.text(2);
+  job.bias = row.text(3);
+  job.state = job_state_of(row.text(4));
+  job.message = row.text(5);
+  job.created_at = row.integer64(6);
+  job.model_version = row.integer(7);
+  job.attempts = row.integer(8);
+  job.kind = job_kind_of(row.text(9));
   job.started_at = optional_integer(row, 10);
   job.finished_at = optional_integer(row, 11);
   job.outcome = outcome_of(row);
@@ -99,44 +101,34 @@ StoredJob job_of(SQLite::Database& database, SQLite::Statement& row) {
   return job;
 }
 
-std::vector<StoredJob> jobs_of(SQLite::Database& database, SQLite::Statement rows) {
+std::vector<StoredJob> jobs_of(Database& database, Rows rows) {
   std::vector<StoredJob> jobs;
-  while (rows.executeStep()) jobs.push_back(job_of(database, rows));
+  while (rows.next()) jobs.push_back(job_of(database, rows));
   return jobs;
 }
 
-void record_start(SQLite::Database& database, std::int64_t job) {
+void record_start(Database& database, std::int64_t job) {
   change(database,
-         "INSERT INTO job_times (job, started_at) VALUES (?, ?) "
+         "INSERT INTO job_times (job, started_at) VALUES ($1, $2) "
          "ON CONFLICT (job) DO UPDATE SET started_at = excluded.started_at",
          job, unix_now());
 }
 
-template <typename Value>
-void bind_if(SQLite::Statement& row, int column, const std::optional<Value>& value) {
-  if (value) row.bind(column, *value);  // unbound is NULL
-}
-
-void record_outcome(SQLite::Database& database, std::int64_t job, const JobOutcome& outcome) {
-  SQLite::Statement row(database,
-                        "INSERT OR REPLACE INTO job_outcomes (job, verdict, before_m, after_m, limit_m, code, why, "
-                        "next_step, peak_bytes, processor_s) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)");
-  row.bind(1, job);
-  row.bind(2, to_text(outcome.verdict));
-  bind_if(row, 3, outcome.before);
-  bind_if(row, 4, outcome.after);
-  bind_if(row, 5, outcome.limit);
-  row.bind(6, outcome.code ? to_text(*outcome.code) : "");
-  row.bind(7, outcome.why);
-  row.bind(8, outcome.next);
-  bind_if(row, 9, outcome.peak_memory);
-  bind_if(row, 10, outcome.processor_time);
-  row.exec();
-}
-
-void record_end(SQLite::Database& database, std::int64_t job, const JobOutcome& outcome) {
+void record_outcome(Database& database, std::int64_t job, const JobOutcome& outcome) {
   change(database,
-         "INSERT INTO job_times (job, finished_at) VALUES (?, ?) "
+         "INSERT INTO job_outcomes (job, verdict, before_m, after_m, limit_m, code, why, next_step, peak_bytes, "
+         "processor_s) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10) ON CONFLICT (job) DO UPDATE SET "
+         "verdict = excluded.verdict, before_m = excluded.before_m, after_m = excluded.after_m, "
+         "limit_m = excluded.limit_m, code = excluded.code, why = excluded.why, next_step = excluded.next_step, "
+         "peak_bytes = excluded.peak_bytes, processor_s = excluded.processor_s",
+         job, to_text(outcome.verdict), outcome.before, outcome.after, outcome.limit,
+         outcome.code ? to_text(*outcome.code) : "", outcome.why, outcome.next, outcome.peak_memory,
+         outcome.processor_time);
+}
+
+void record_end(Database& database, std::int64_t job, const JobOutcome& outcome) {
+  change(database,
+         "INSERT INTO job_times (job, finished_at) VALUES ($1, $2) "
          "ON CONFLICT (job) DO UPDATE SET finished_at = excluded.finished_at",
          job, unix_now());
   record_outcome(database, job, outcome);
@@ -144,35 +136,37 @@ void record_end(SQLite::Database& database, std::int64_t job, const JobOutcome& 
 
 }  // namespace
 
-std::int64_t insert_job(SQLite::Database& database, const StoredJob& job) {
-  change(database,
-         "INSERT INTO jobs (cell, level, bias, state, message, created_at, kind) VALUES (?, ?, ?, ?, ?, ?, ?)",
-         job.cell, job.level, job.bias, to_text(JobState::kQueued), job.message, job.created_at, stored_kind(job.kind));
-  const std::int64_t id = database.getLastInsertRowid();
-  if (job.kind == JobKind::kCheck) change(database, "INSERT INTO health_checks (job) VALUES (?)", id);
+std::int64_t insert_job(Database& database, const StoredJob& job) {
+  Rows made = prepare(
+      database,
+      "INSERT INTO jobs (cell, level, bias, state, message, created_at, kind) VALUES ($1, $2, $3, $4, $5, $6, $7) "
+      "RETURNING id",
+      job.cell, job.level, job.bias, to_text(JobState::kQueued), job.message, job.created_at, stored_kind(job.kind));
+  const std::int64_t id = made.next() ? made.integer64(0) : 0;
+  if (job.kind == JobKind::kCheck) change(database, "INSERT INTO health_checks (job) VALUES ($1)", id);
   return id;
 }
 
-void insert_job_batches(SQLite::Database& database, std::int64_t job, const std::string& cell,
+void insert_job_batches(Database& database, std::int64_t job, const std::string& cell,
                         const std::vector<std::string>& batch_ids) {
   int position = 0;
   for (const std::string& id : batch_ids) {
-    change(database, "INSERT INTO job_batches (job, position, cell, batch) VALUES (?, ?, ?, ?)", job, position++, cell,
-           id);
+    change(database, "INSERT INTO job_batches (job, position, cell, batch) VALUES ($1, $2, $3, $4)", job, position++,
+           cell, id);
   }
 }
 
-Result<StoredJob> read_job(SQLite::Database& database, std::int64_t id) {
-  auto row = prepare(database, (std::string(kJobColumns) + "WHERE id = ?").c_str(), id);
-  if (!row.executeStep()) return failure(ErrorCode::kNotFound, "job {} does not exist", id).of("job").with_value(id);
+Result<StoredJob> read_job(Database& database, std::int64_t id) {
+  auto row = prepare(database, (std::string(kJobColumns) + "WHERE id = $1").c_str(), id);
+  if (!row.next()) return failure(ErrorCode::kNotFound, "job {} does not exist", id).of("job").with_value(id);
   return job_of(database, row);
 }
 
-Status end_job(SQLite::Database& database, std::int64_t id, const std::string& cell, int model_version,
+Status end_job(Database& database, std::int64_t id, const std::string& cell, int model_version,
                const std::string& message, const JobOutcome& outcome) {
   return changed_one(change(database,
-                            "UPDATE jobs SET state = 'done', model_version = ?1, message = ?2 "
-                            "WHERE id = ?3 AND (?4 = '' OR cell = ?4) AND state IN ('queued', 'running')",
+                            "UPDATE jobs SET state = 'done', model_version = $1, message = $2 "
+                            "WHERE id = $3 AND ($4 = '' OR cell = $4) AND state IN ('queued', 'running')",
                             model_version, message, id, cell),
                      id)
       .map([&] { record_end(database, id, outcome); });
@@ -181,20 +175,21 @@ Status end_job(SQLite::Database& database, std::int64_t id, const std::string& c
 namespace {
 
 /// One job, where the others can be read even if it cannot.
-Result<StoredJob> read_alone(SQLite::Database& database, std::int64_t id) {
+Result<StoredJob> read_alone(Database& database, std::int64_t id, const std::string& place) {
   try {
     return read_job(database, id);
-  } catch (const SQLite::Exception& error) {
-    return failure_of(error, database.getFilename());
+  } catch (const DatabaseError& error) {
+    if (error.kind() != DatabaseError::Kind::kOther) throw;
+    return failure_of(error, place);
   }
 }
 
-Result<StoredJob> insert_job_over(SQLite::Database& database, const StoredJob& job) {
+Result<StoredJob> insert_job_over(Database& database, const StoredJob& job) {
   for (const std::string& id : job.batch_ids) {
-    if (!prepare(database, "SELECT 1 FROM batches WHERE cell = ? AND id = ?", job.cell, id).executeStep()) {
+    if (!exists(database, "SELECT 1 FROM batches WHERE cell = $1 AND id = $2", job.cell, id)) {
       return failure(ErrorCode::kNotFound, "cell {} has no batch {}", job.cell, id).of("batch").with_text(id);
     }
-    if (prepare(database, "SELECT 1 FROM discarded WHERE cell = ? AND batch = ?", job.cell, id).executeStep())
+    if (exists(database, "SELECT 1 FROM discarded WHERE cell = $1 AND batch = $2", job.cell, id))
       return discarded_failure(job.cell, id);
   }
   const std::int64_t id = insert_job(database, job);
@@ -203,10 +198,10 @@ Result<StoredJob> insert_job_over(SQLite::Database& database, const StoredJob& j
 }
 
 /// The end of a job that made no model.
-void record_job_end(SQLite::Database& database, std::int64_t id, const std::string& verdict, const std::string& message,
+void record_job_end(Database& database, std::int64_t id, const std::string& verdict, const std::string& message,
                     const ChangeId& by) {
-  auto row = prepare(database, "SELECT cell FROM jobs WHERE id = ?", id);
-  const std::string cell = row.executeStep() ? row.getColumn(0).getString() : "";
+  auto row = prepare(database, "SELECT cell FROM jobs WHERE id = $1", id);
+  const std::string cell = row.next() ? row.text(0) : "";
   record_audit(database, {cell, "job", fmt::format("job {}", id), "open", verdict, message}, by);
 }
 
@@ -224,7 +219,7 @@ const char* asked_for(JobKind kind) {
 
 /// Queues the job that `insert` makes, or returns the one that was queued under this id before.
 template <typename Insert>
-Result<StoredJob> queue_once(SQLite::Database& database, const StoredJob& job, const ChangeId& change_id,
+Result<StoredJob> queue_once(Database& database, const StoredJob& job, const ChangeId& change_id,
                              const Insert& insert) {
   const auto queued = once(database, job.cell, change_id, [&] {
     return insert().map([&](const StoredJob& made) {
@@ -243,43 +238,36 @@ Result<StoredJob> queue_once(SQLite::Database& database, const StoredJob& job, c
 }  // namespace
 
 Result<StoredJob> Store::add_job(const StoredJob& job, bool release, const ChangeId& change_id) {
-  return connection_->in_transaction([&](SQLite::Database& database) {
+  return connection_->in_transaction([&](Database& database) {
     return queue_once(database, job, change_id, [&]() -> Result<StoredJob> {
       Result<StoredJob> queued = insert_job_over(database, job);
       if (!queued || !release) return queued;
       for (const std::string& id : job.batch_ids)
-        change(database, "INSERT INTO job_releases (job, cell, batch) VALUES (?, ?, ?)", queued->id, job.cell, id);
+        change(database, "INSERT INTO job_releases (job, cell, batch) VALUES ($1, $2, $3)", queued->id, job.cell, id);
       return queued;
     });
   });
 }
 
 Result<bool> Store::may_release(std::int64_t job) const {
-  return connection_->exclusively([&](SQLite::Database& database) -> Result<bool> {
-    SQLite::Statement query(database, "SELECT EXISTS (SELECT 1 FROM job_releases WHERE job = ?)");
-    query.bind(1, job);
-    query.executeStep();
-    return query.getColumn(0).getInt() != 0;
+  return connection_->exclusively([&](Database& database) -> Result<bool> {
+    return exists(database, "SELECT 1 FROM job_releases WHERE job = $1 LIMIT 1", job);
   });
 }
 
 Result<bool> Store::was_made_by_job(const std::string& cell, int version) const {
-  return connection_->exclusively([&](SQLite::Database& database) -> Result<bool> {
-    SQLite::Statement query(database, "SELECT EXISTS (SELECT 1 FROM jobs WHERE cell = ? AND model_version = ?)");
-    query.bind(1, cell);
-    query.bind(2, version);
-    query.executeStep();
-    return query.getColumn(0).getInt() != 0;
+  return connection_->exclusively([&](Database& database) -> Result<bool> {
+    return exists(database, "SELECT 1 FROM jobs WHERE cell = $1 AND model_version = $2 LIMIT 1", cell, version);
   });
 }
 
 Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const StoredDiagnosis& diagnosis,
                                        const ChangeId& change_id) {
-  return connection_->in_transaction([&](SQLite::Database& database) {
+  return connection_->in_transaction([&](Database& database) {
     return queue_once(database, job, change_id, [&]() -> Result<StoredJob> {
       Result<StoredJob> queued = insert_job_over(database, job);
       if (queued) {
-        change(database, "INSERT INTO diagnoses (job, csv, apply) VALUES (?, ?, ?)", queued->id, diagnosis.csv,
+        change(database, "INSERT INTO diagnoses (job, csv, apply) VALUES ($1, $2, $3)", queued->id, diagnosis.csv,
                diagnosis.apply ? 1 : 0);
       }
       return queued;
@@ -288,32 +276,30 @@ Result<StoredJob> Store::add_diagnosis(const StoredJob& job, const StoredDiagnos
 }
 
 Result<StoredDiagnosis> Store::diagnosis(std::int64_t job) const {
-  return connection_->exclusively([&](SQLite::Database& database) -> Result<StoredDiagnosis> {
-    auto row = prepare(database, "SELECT csv, apply, findings, page FROM diagnoses WHERE job = ?", job);
-    if (!row.executeStep())
-      return failure(ErrorCode::kNotFound, "job {} is no diagnosis", job).of("job").with_value(job);
+  return connection_->exclusively([&](Database& database) -> Result<StoredDiagnosis> {
+    auto row = prepare(database, "SELECT csv, apply, findings, page FROM diagnoses WHERE job = $1", job);
+    if (!row.next()) return failure(ErrorCode::kNotFound, "job {} is no diagnosis", job).of("job").with_value(job);
     if (const auto asked = read_job(database, job);
         asked && is_pruned(database, "answer of job", asked->cell, std::to_string(job)))
       return pruned_failure(fmt::format("what job {} found", job)).of("job").with_value(job);
-    return StoredDiagnosis{row.getColumn(0).getString(), row.getColumn(1).getInt() != 0, row.getColumn(2).getString(),
-                           row.getColumn(3).getString()};
+    return StoredDiagnosis{row.text(0), row.truth(1), row.text(2), row.text(3)};
   });
 }
 
 Result<std::vector<StoredCheck>> Store::health_checks(const std::string& cell, std::int64_t since,
                                                       std::size_t most) const {
-  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::vector<StoredCheck>> {
+  return connection_->exclusively([&](Database& database) -> Result<std::vector<StoredCheck>> {
     auto rows = prepare(database,
                         "SELECT jobs.id, finished_at, findings FROM health_checks "
                         "JOIN jobs ON jobs.id = health_checks.job JOIN diagnoses ON diagnoses.job = jobs.id "
                         "JOIN job_times ON job_times.job = jobs.id "
-                        "WHERE cell = ? AND state = 'done' AND findings <> '' AND finished_at >= ? "
-                        "ORDER BY jobs.id DESC LIMIT ?",
-                        cell, since, most == 0 ? std::int64_t{-1} : static_cast<std::int64_t>(most));
+                        "WHERE cell = $1 AND state = 'done' AND findings <> '' AND finished_at >= $2 "
+                        "ORDER BY jobs.id DESC LIMIT $3",
+                        cell, since, most == 0 ? kAll : static_cast<std::int64_t>(most));
     std::vector<StoredCheck> checks;
-    while (rows.executeStep()) {
-      const std::int64_t job = rows.getColumn(0).getInt64();
-      checks.push_back({job, rows.getColumn(1).getInt64(), batches_of(database, job), rows.getColumn(2).getString()});
+    while (rows.next()) {
+      const std::int64_t job = rows.integer64(0);
+      checks.push_back({job, rows.integer64(1), batches_of(database, job), rows.text(2)});
     }
     std::reverse(checks.begin(), checks.end());
     return checks;
@@ -321,29 +307,29 @@ Result<std::vector<StoredCheck>> Store::health_checks(const std::string& cell, s
 }
 
 Status Store::store_findings(std::int64_t job, const std::string& findings, const std::string& page) {
-  return connection_->in_transaction([&](SQLite::Database& database) -> Status {
+  return connection_->in_transaction([&](Database& database) -> Status {
     const int changes =
-        change(database, "UPDATE diagnoses SET findings = ?, page = ? WHERE job = ?", findings, page, job);
+        change(database, "UPDATE diagnoses SET findings = $1, page = $2 WHERE job = $3", findings, page, job);
     change(database,
            "UPDATE diagnoses SET page = '' WHERE page <> '' AND job NOT IN "
-           "(SELECT job FROM diagnoses WHERE page <> '' ORDER BY job DESC LIMIT ?)",
+           "(SELECT job FROM diagnoses WHERE page <> '' ORDER BY job DESC LIMIT $1)",
            kPagesKept);
     return changed_one(changes, job);
   });
 }
 
 Result<StoredJob> Store::job(std::int64_t id) const {
-  return connection_->exclusively([&](SQLite::Database& database) { return read_job(database, id); });
+  return connection_->exclusively([&](Database& database) { return read_job(database, id); });
 }
 
 Result<std::vector<StoredJob>> Store::unfinished_jobs() const {
-  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::vector<StoredJob>> {
+  return connection_->exclusively([&](Database& database) -> Result<std::vector<StoredJob>> {
     std::vector<std::int64_t> ids;
-    SQLite::Statement rows(database, "SELECT id FROM jobs WHERE state IN ('queued', 'running') ORDER BY id");
-    while (rows.executeStep()) ids.push_back(rows.getColumn(0).getInt64());
+    Rows rows = prepare(database, "SELECT id FROM jobs WHERE state IN ('queued', 'running') ORDER BY id");
+    while (rows.next()) ids.push_back(rows.integer64(0));
     std::vector<StoredJob> jobs;
     for (const std::int64_t id : ids) {
-      auto job = read_alone(database, id);
+      auto job = read_alone(database, id, connection_->path);
       if (job) jobs.push_back(std::move(*job));
       if (!job) connection_->note_damage(fmt::format("job {}: {}", id, sentence(job.error())));
     }
@@ -353,21 +339,21 @@ Result<std::vector<StoredJob>> Store::unfinished_jobs() const {
 
 Result<std::vector<StoredJob>> Store::recent_jobs(const std::string& cell, int finished) const {
   const std::string wanted = std::string(kJobColumns) +
-                             "WHERE (?1 = '' OR cell = ?1) AND (state IN ('queued', 'running') "
-                             "OR id IN (SELECT id FROM jobs WHERE (?1 = '' OR cell = ?1) AND state = 'done' "
-                             "ORDER BY id DESC LIMIT ?2) "
-                             "OR id IN (SELECT id FROM jobs WHERE (?1 = '' OR cell = ?1) AND state = 'failed' "
-                             "ORDER BY id DESC LIMIT ?2)) ORDER BY id";
-  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::vector<StoredJob>> {
+                             "WHERE ($1 = '' OR cell = $1) AND (state IN ('queued', 'running') "
+                             "OR id IN (SELECT id FROM jobs WHERE ($1 = '' OR cell = $1) AND state = 'done' "
+                             "ORDER BY id DESC LIMIT $2) "
+                             "OR id IN (SELECT id FROM jobs WHERE ($1 = '' OR cell = $1) AND state = 'failed' "
+                             "ORDER BY id DESC LIMIT $2)) ORDER BY id";
+  return connection_->exclusively([&](Database& database) -> Result<std::vector<StoredJob>> {
     return jobs_of(database, prepare(database, wanted.c_str(), cell, finished));
   });
 }
 
 Status Store::set_job_running(std::int64_t id) {
-  return connection_->in_transaction([&](SQLite::Database& database) {
+  return connection_->in_transaction([&](Database& database) {
     return changed_one(change(database,
                               "UPDATE jobs SET state = 'running', attempts = attempts + 1 "
-                              "WHERE id = ? AND state IN ('queued', 'running')",
+                              "WHERE id = $1 AND state IN ('queued', 'running')",
                               id),
                        id)
         .map([&] { record_start(database, id); });
@@ -375,21 +361,22 @@ Status Store::set_job_running(std::int64_t id) {
 }
 
 Status Store::set_job_queued(std::int64_t id, bool attempt_counts) {
-  return connection_->in_transaction([&](SQLite::Database& database) {
-    return changed_one(change(database,
-                              "UPDATE jobs SET state = 'queued', attempts = MAX(attempts - ?, 0) "
-                              "WHERE id = ? AND state IN ('queued', 'running')",
-                              attempt_counts ? 0 : 1, id),
-                       id);
+  return connection_->in_transaction([&](Database& database) {
+    return changed_one(
+        change(database,
+               "UPDATE jobs SET state = 'queued', attempts = attempts - CASE WHEN attempts > 0 THEN $1 ELSE 0 END "
+               "WHERE id = $2 AND state IN ('queued', 'running')",
+               attempt_counts ? 0 : 1, id),
+        id);
   });
 }
 
 Status Store::set_job_failed(std::int64_t id, const std::string& message, const JobOutcome& outcome,
                              const std::string& who) {
-  return connection_->in_transaction([&](SQLite::Database& database) {
+  return connection_->in_transaction([&](Database& database) {
     return changed_one(change(database,
-                              "UPDATE jobs SET state = 'failed', message = ? "
-                              "WHERE id = ? AND state IN ('queued', 'running')",
+                              "UPDATE jobs SET state = 'failed', message = $1 "
+                              "WHERE id = $2 AND state IN ('queued', 'running')",
                               message, id),
                        id)
         .map([&] {
@@ -400,7 +387,7 @@ Status Store::set_job_failed(std::int64_t id, const std::string& message, const 
 }
 
 Status Store::set_job_done(std::int64_t id, const std::string& message, const JobOutcome& outcome) {
-  return connection_->in_transaction([&](SQLite::Database& database) {
+  return connection_->in_transaction([&](Database& database) {
     return end_job(database, id, "", 0, message, outcome).map([&] {
       record_job_end(database, id, to_text(outcome.verdict), message, {});
     });

@@ -1,11 +1,11 @@
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "server/base/text_file.h"
 #include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
 #include "server/store/audit_rows.h"
+#include "server/store/cell_rows.h"
 #include "server/store/changes.h"
 #include "server/store/connection.h"
 #include "server/store/job_rows.h"
@@ -26,20 +26,20 @@ struct Activation {
   std::optional<std::int64_t> back;
 };
 
-std::optional<Activation> activation_of(SQLite::Statement row) {
-  if (!row.executeStep()) return std::nullopt;
-  Activation activation{row.getColumn(0).getInt64(), row.getColumn(1).getInt(), std::nullopt};
-  if (!row.isColumnNull(2)) activation.back = row.getColumn(2).getInt64();
+std::optional<Activation> activation_of(Rows row) {
+  if (!row.next()) return std::nullopt;
+  Activation activation{row.integer64(0), row.integer(1), std::nullopt};
+  if (!row.is_null(2)) activation.back = row.integer64(2);
   return activation;
 }
 
-std::optional<Activation> present_activation(SQLite::Database& database, const std::string& cell) {
+std::optional<Activation> present_activation(Database& database, const std::string& cell) {
   return activation_of(prepare(
-      database, "SELECT number, version, back FROM activations WHERE cell = ? ORDER BY number DESC LIMIT 1", cell));
+      database, "SELECT number, version, back FROM activations WHERE cell = $1 ORDER BY number DESC LIMIT 1", cell));
 }
 
 /// The activations that repeated rollbacks restore, the next one first.
-Result<std::vector<Activation>> activations_before(SQLite::Database& database, const std::string& cell) {
+Result<std::vector<Activation>> activations_before(Database& database, const std::string& cell) {
   const auto present = present_activation(database, cell);
   if (!present) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell).of("cell").with_text(cell);
   if (!present->back) {
@@ -50,42 +50,39 @@ Result<std::vector<Activation>> activations_before(SQLite::Database& database, c
   std::vector<Activation> before;
   for (auto back = present->back; back; back = before.back().back) {
     before.push_back(
-        activation_of(prepare(database, "SELECT number, version, back FROM activations WHERE number = ?", *back))
+        activation_of(prepare(database, "SELECT number, version, back FROM activations WHERE number = $1", *back))
             .value());
   }
   return before;
 }
 
-void insert_activation(SQLite::Database& database, const std::string& cell, int version,
+void insert_activation(Database& database, const std::string& cell, int version,
                        const std::optional<std::int64_t>& back,
                        const std::optional<std::int64_t>& number = std::nullopt) {
-  SQLite::Statement row(database,
-                        "INSERT INTO activations (cell, version, back, activated_at, number) VALUES (?, ?, ?, ?, ?)");
-  row.bind(1, cell);
-  row.bind(2, version);
-  if (back) row.bind(3, *back);  // unbound is NULL
-  row.bind(4, unix_now());
-  if (number) row.bind(5, *number);  // else the next one
-  row.exec();
+  if (!number) {
+    change(database, "INSERT INTO activations (cell, version, back, activated_at) VALUES ($1, $2, $3, $4)", cell,
+           version, back, unix_now());
+    return;
+  }
+  change(database, "INSERT INTO activations (cell, version, back, activated_at, number) VALUES ($1, $2, $3, $4, $5)",
+         cell, version, back, unix_now(), *number);
 }
 
 /// Whoever decides what is in force counts it; who follows takes the number of the one that decided.
-void count_decision(SQLite::Database& database) {
-  change(database, "UPDATE replica SET epoch = epoch + 1 WHERE writes = 1");
-}
+void count_decision(Database& database) { change(database, "UPDATE replica SET epoch = epoch + 1 WHERE writes = 1"); }
 
 /// Releases from quarantine the batches that the job of this version may release.
-void release_batches_of(SQLite::Database& database, const std::string& cell, int version, const ChangeId& by) {
+void release_batches_of(Database& database, const std::string& cell, int version, const ChangeId& by) {
   auto rows = prepare(database,
-                      "SELECT id, quarantine FROM batches WHERE cell = ?1 AND quarantine <> '' AND id IN "
+                      "SELECT id, quarantine FROM batches WHERE cell = $1 AND quarantine <> '' AND id IN "
                       "(SELECT batch FROM job_releases JOIN jobs ON jobs.id = job_releases.job "
-                      "WHERE jobs.cell = ?1 AND jobs.model_version = ?2) "
-                      "AND id NOT IN (SELECT batch FROM discarded WHERE cell = ?1)",
+                      "WHERE jobs.cell = $1 AND jobs.model_version = $2) "
+                      "AND id NOT IN (SELECT batch FROM discarded WHERE cell = $1)",
                       cell, version);
   std::vector<std::pair<std::string, std::string>> kept_out;
-  while (rows.executeStep()) kept_out.emplace_back(rows.getColumn(0).getString(), rows.getColumn(1).getString());
+  while (rows.next()) kept_out.emplace_back(rows.text(0), rows.text(1));
   for (const auto& [id, why] : kept_out) {
-    change(database, "UPDATE batches SET quarantine = '' WHERE cell = ? AND id = ?", cell, id);
+    change(database, "UPDATE batches SET quarantine = '' WHERE cell = $1 AND id = $2", cell, id);
     record_audit(database,
                  {cell, "release", "batch " + id, "in quarantine: " + why, "free",
                   fmt::format("version {} was made from it", version)},
@@ -97,38 +94,27 @@ std::string spoken(const std::optional<Activation>& activation) {
   return activation ? fmt::format("version {}", activation->version) : "none";
 }
 
-template <typename Value>
-void bind_if(SQLite::Statement& row, int column, const std::optional<Value>& value) {
-  if (value) row.bind(column, *value);  // unbound is NULL
-}
-
-void record_figures(SQLite::Database& database, std::int64_t activation, const JobOutcome& judged) {
-  SQLite::Statement row(
-      database, "INSERT INTO activation_figures (number, before_m, after_m, limit_m, why) VALUES (?, ?, ?, ?, ?)");
-  row.bind(1, activation);
-  bind_if(row, 2, judged.before);
-  bind_if(row, 3, judged.after);
-  bind_if(row, 4, judged.limit);
-  row.bind(5, judged.why);
-  row.exec();
+void record_figures(Database& database, std::int64_t activation, const JobOutcome& judged) {
+  change(database,
+         "INSERT INTO activation_figures (number, before_m, after_m, limit_m, why) VALUES ($1, $2, $3, $4, $5)",
+         activation, judged.before, judged.after, judged.limit, judged.why);
 }
 
 /// How the version that this activation put in force was judged: then, or when a job made it.
-void add_judgement(SQLite::Database& database, const std::string& cell, const Activation& activation,
-                   InForceRecord& record) {
+void add_judgement(Database& database, const std::string& cell, const Activation& activation, InForceRecord& record) {
   constexpr const char* kFigures =
-      "SELECT before_m, after_m, limit_m, why, 0 FROM activation_figures WHERE number = ?1 "
+      "SELECT before_m, after_m, limit_m, why, 0 FROM activation_figures WHERE number = $1 "
       "UNION ALL SELECT before_m, after_m, limit_m, why, 1 FROM job_outcomes JOIN jobs ON jobs.id = job_outcomes.job "
-      "WHERE cell = ?2 AND model_version = ?3 LIMIT 1";
+      "WHERE cell = $2 AND model_version = $3 ORDER BY 5 LIMIT 1";
   auto row = prepare(database, kFigures, activation.number, cell, activation.version);
-  if (!row.executeStep()) return;
+  if (!row.next()) return;
   JobOutcome& judged = record.judged.emplace();
   judged.verdict = JobVerdict::kInForce;
   judged.before = optional_number(row, 0);
   judged.after = optional_number(row, 1);
   judged.limit = optional_number(row, 2);
-  judged.why = row.getColumn(3).getString();
-  record.judged_when_made = row.getColumn(4).getInt() != 0;
+  judged.why = row.text(3);
+  record.judged_when_made = row.truth(4);
 }
 
 /// What the audit trail says of why it was done.
@@ -138,8 +124,8 @@ std::string reason_of(const ChangeId& by, const std::optional<JobOutcome>& judge
 }
 
 /// Puts `version` in force. The new activation remembers the present one. `what`: as the audit trail calls it.
-void activate_on_top(SQLite::Database& database, const std::string& cell, int version, const char* what,
-                     const std::string& why, const ChangeId& by) {
+void activate_on_top(Database& database, const std::string& cell, int version, const char* what, const std::string& why,
+                     const ChangeId& by) {
   const auto present = present_activation(database, cell);
   if (present && present->version == version) return;
   insert_activation(database, cell, version, present ? std::optional(present->number) : std::nullopt);
@@ -147,24 +133,18 @@ void activate_on_top(SQLite::Database& database, const std::string& cell, int ve
   record_audit(database, {cell, what, "in force", spoken(present), fmt::format("version {}", version), why}, by);
 }
 
-void insert_model_times(SQLite::Database& database, const std::string& cell, int version,
-                        const ModelProvenance& provenance) {
-  SQLite::Statement row(database,
-                        "INSERT INTO model_times (cell, version, trained_at, measured_at) VALUES (?, ?, ?, ?)");
-  row.bind(1, cell);
-  row.bind(2, version);
-  row.bind(3, provenance.trained_at);
-  if (provenance.measured_at) row.bind(4, *provenance.measured_at);  // unbound is NULL
-  row.exec();
+void insert_model_times(Database& database, const std::string& cell, int version, const ModelProvenance& provenance) {
+  change(database, "INSERT INTO model_times (cell, version, trained_at, measured_at) VALUES ($1, $2, $3, $4)", cell,
+         version, provenance.trained_at, provenance.measured_at);
 }
 
-void insert_model(SQLite::Database& database, const std::string& cell, int version, const CompensatedModel& model,
+void insert_model(Database& database, const std::string& cell, int version, const CompensatedModel& model,
                   const std::string& content) {
   const ModelProvenance& from = model.provenance();
   const auto& validation = model.parts().validation;
   change(database,
          "INSERT INTO models (cell, version, id, hash, level, batch_id, created_at, training_poses, validation_rms, "
-         "content) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+         "content) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10)",
          cell, version, from.id, from.hash, from.level, from.batch_id, unix_now(), from.training_poses,
          validation && validation->poses > 0 ? validation->compensated.rms : 0.0, content);
   insert_model_times(database, cell, version, from);
@@ -180,24 +160,13 @@ Result<CompensatedModel> model_in(const ServedCopies::Copy& copy) {
   return deserialize(*text, copy.file, ModelTexts::kAsTheyAre);
 }
 
-Result<int> next_version(SQLite::Database& database, const std::string& cell) {
-  auto row = prepare(database,
-                     "SELECT MAX((SELECT COALESCE(MAX(version), 0) FROM models WHERE cell = ?1), "
-                     "COALESCE((SELECT newest FROM versions_elsewhere WHERE cell = ?1), 0)) + 1",
-                     cell);
-  row.executeStep();
-  const std::int64_t next = row.getColumn(0).getInt64();
-  if (next > std::numeric_limits<int>::max()) return refused("cell {} has no number left for a version", cell);
-  return static_cast<int>(next);
-}
-
 }  // namespace
 
 Result<int> Store::add_model(const std::string& cell, const CompensatedModel& model, std::int64_t job,
                              bool put_in_force, const std::string& message, bool release, const ChangeId& change_id,
                              const JobOutcome& outcome) {
   const std::string content = serialize(model);
-  const auto insert = [&](SQLite::Database& database) -> Result<ChangeOutcome> {
+  const auto insert = [&](Database& database) -> Result<ChangeOutcome> {
     const auto next = next_version(database, cell);
     if (!next) return tl::make_unexpected(next.error());
     const int version = *next;
@@ -216,15 +185,15 @@ Result<int> Store::add_model(const std::string& cell, const CompensatedModel& mo
     return ChangeOutcome{version};
   };
   const auto stored = connection_->in_transaction(
-      [&](SQLite::Database& database) { return once(database, cell, change_id, [&] { return insert(database); }); });
+      [&](Database& database) { return once(database, cell, change_id, [&] { return insert(database); }); });
   if (stored && put_in_force) copy_after_change(cell);
   return version_of(stored);
 }
 
 Status Store::activate(const std::string& cell, int version, const ChangeId& change_id,
                        const std::optional<JobOutcome>& judged) {
-  const auto activate_in = [&](SQLite::Database& database) -> Result<ChangeOutcome> {
-    if (!prepare(database, "SELECT 1 FROM models WHERE cell = ? AND version = ?", cell, version).executeStep()) {
+  const auto activate_in = [&](Database& database) -> Result<ChangeOutcome> {
+    if (!exists(database, "SELECT 1 FROM models WHERE cell = $1 AND version = $2", cell, version)) {
       return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version)
           .of("version")
           .with_value(version);
@@ -238,9 +207,8 @@ Status Store::activate(const std::string& cell, int version, const ChangeId& cha
     if (judged && now && (!before || now->number != before->number)) record_figures(database, now->number, *judged);
     return ChangeOutcome{version};
   };
-  const auto activated = connection_->in_transaction([&](SQLite::Database& database) {
-    return once(database, cell, change_id, [&] { return activate_in(database); });
-  });
+  const auto activated = connection_->in_transaction(
+      [&](Database& database) { return once(database, cell, change_id, [&] { return activate_in(database); }); });
   if (activated) copy_after_change(cell);
   return activated.map([](const ChangeOutcome&) {});
 }
@@ -248,30 +216,29 @@ Status Store::activate(const std::string& cell, int version, const ChangeId& cha
 namespace {
 
 /// The version under which a model of this hash is stored with its text; empty: none is.
-std::optional<int> version_of_hash(SQLite::Database& database, const std::string& cell, const std::string& hash) {
+std::optional<int> version_of_hash(Database& database, const std::string& cell, const std::string& hash) {
   auto rows =
-      prepare(database, "SELECT version FROM models WHERE cell = ? AND hash = ? ORDER BY version DESC", cell, hash);
-  while (rows.executeStep()) {
-    const int version = rows.getColumn(0).getInt();
+      prepare(database, "SELECT version FROM models WHERE cell = $1 AND hash = $2 ORDER BY version DESC", cell, hash);
+  while (rows.next()) {
+    const int version = rows.integer(0);
     if (!is_pruned(database, "version", cell, std::to_string(version))) return version;
   }
   return std::nullopt;
 }
 
 /// Writes a model's text anew where what is stored is something else.
-void mend_model(SQLite::Database& database, const std::string& cell, int version, const std::string& content,
+void mend_model(Database& database, const std::string& cell, int version, const std::string& content,
                 const ChangeId& by) {
-  auto differs =
-      prepare(database, "SELECT 1 FROM models WHERE cell = ? AND version = ? AND content <> ?", cell, version, content);
-  if (!differs.executeStep()) return;
-  change(database, "UPDATE models SET content = ? WHERE cell = ? AND version = ?", content, cell, version);
+  auto differs = prepare(database, "SELECT 1 FROM models WHERE cell = $1 AND version = $2 AND content <> $3", cell,
+                         version, content);
+  if (!differs.next()) return;
+  change(database, "UPDATE models SET content = $1 WHERE cell = $2 AND version = $3", content, cell, version);
   record_audit(database, {cell, "mend", fmt::format("version {}", version), "damaged", "as it was"}, by);
 }
 
 /// The other server's number, if it is free here: what is stored already is not written over.
-Result<int> free_version(SQLite::Database& database, const std::string& cell, int wanted) {
-  const bool taken =
-      prepare(database, "SELECT 1 FROM models WHERE cell = ? AND version = ?", cell, wanted).executeStep();
+Result<int> free_version(Database& database, const std::string& cell, int wanted) {
+  const bool taken = exists(database, "SELECT 1 FROM models WHERE cell = $1 AND version = $2", cell, wanted);
   return taken || wanted < 1 || wanted > kHighestTold ? next_version(database, cell) : Result<int>(wanted);
 }
 
@@ -280,7 +247,8 @@ Result<int> free_version(SQLite::Database& database, const std::string& cell, in
 Result<int> Store::adopt(const std::string& cell, const VersionInForce& decided, const CompensatedModel* model,
                          const ChangeId& by) {
   const std::string content = model == nullptr ? std::string() : serialize(*model);
-  const auto adopted = connection_->in_transaction([&](SQLite::Database& database) -> Result<int> {
+  const auto adopted = connection_->in_transaction([&](Database& database) -> Result<int> {
+    lock_cell(database, cell);
     std::optional<int> version = version_of_hash(database, cell, decided.hash);
     if (!version && model == nullptr)
       return failure(ErrorCode::kNotFound, "cell {} has no model {}", cell, decided.hash).of("hash");
@@ -288,6 +256,7 @@ Result<int> Store::adopt(const std::string& cell, const VersionInForce& decided,
       const auto free = free_version(database, cell, decided.version);
       if (!free) return free;
       version = *free;
+      count_version(database, cell, *version);
       insert_model(database, cell, *version, *model, content);
       record_audit(database,
                    {cell, "follow", fmt::format("version {}", *version), "", fmt::format("sha256 {}", decided.hash),
@@ -308,20 +277,20 @@ Result<int> Store::adopt(const std::string& cell, const VersionInForce& decided,
 
 Result<bool> Store::has_model(const std::string& cell, const std::string& hash) const {
   return connection_->exclusively(
-      [&](SQLite::Database& database) -> Result<bool> { return version_of_hash(database, cell, hash).has_value(); });
+      [&](Database& database) -> Result<bool> { return version_of_hash(database, cell, hash).has_value(); });
 }
 
 Result<std::optional<InForceRecord>> Store::in_force_record(const std::string& cell) const {
-  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::optional<InForceRecord>> {
+  return connection_->exclusively([&](Database& database) -> Result<std::optional<InForceRecord>> {
     const auto present = present_activation(database, cell);
     if (!present) return std::optional<InForceRecord>();
-    auto since = prepare(database, "SELECT activated_at FROM activations WHERE number = ?", present->number);
-    since.executeStep();
+    auto since = prepare(database, "SELECT activated_at FROM activations WHERE number = $1", present->number);
+    since.next();
     InForceRecord record;
     record.version = present->version;
-    record.since = since.getColumn(0).getInt64();
+    record.since = since.integer64(0);
     if (present->back) {
-      record.before = activation_of(prepare(database, "SELECT number, version, back FROM activations WHERE number = ?",
+      record.before = activation_of(prepare(database, "SELECT number, version, back FROM activations WHERE number = $1",
                                             *present->back))
                           ->version;
     }
@@ -331,7 +300,7 @@ Result<std::optional<InForceRecord>> Store::in_force_record(const std::string& c
 }
 
 Result<std::vector<int>> Store::previous_in_force(const std::string& cell) const {
-  return connection_->exclusively([&](SQLite::Database& database) {
+  return connection_->exclusively([&](Database& database) {
     return activations_before(database, cell).map([](const std::vector<Activation>& before) {
       std::vector<int> versions;
       for (const Activation& activation : before) versions.push_back(activation.version);
@@ -341,7 +310,7 @@ Result<std::vector<int>> Store::previous_in_force(const std::string& cell) const
 }
 
 Result<int> Store::rollback(const std::string& cell, int steps, const ChangeId& change_id) {
-  const auto go_back = [&](SQLite::Database& database) -> Result<ChangeOutcome> {
+  const auto go_back = [&](Database& database) -> Result<ChangeOutcome> {
     const auto before = activations_before(database, cell);
     if (!before) return tl::make_unexpected(before.error());
     if (steps < 1 || static_cast<std::size_t>(steps) > before->size()) {
@@ -358,33 +327,33 @@ Result<int> Store::rollback(const std::string& cell, int steps, const ChangeId& 
     return ChangeOutcome{wanted.version};
   };
   const auto restored = connection_->in_transaction(
-      [&](SQLite::Database& database) { return once(database, cell, change_id, [&] { return go_back(database); }); });
+      [&](Database& database) { return once(database, cell, change_id, [&] { return go_back(database); }); });
   if (restored) copy_after_change(cell);
   return version_of(restored);
 }
 
 Result<std::vector<StoredModel>> Store::models(const std::string& cell) const {
-  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::vector<StoredModel>> {
+  return connection_->exclusively([&](Database& database) -> Result<std::vector<StoredModel>> {
     const auto present = present_activation(database, cell);
     auto rows = prepare(database,
                         "SELECT version, id, hash, level, batch_id, created_at, training_poses, validation_rms, "
                         "COALESCE(trained_at, created_at), measured_at "
-                        "FROM models LEFT JOIN model_times USING (cell, version) WHERE cell = ? ORDER BY version",
+                        "FROM models LEFT JOIN model_times USING (cell, version) WHERE cell = $1 ORDER BY version",
                         cell);
     std::vector<StoredModel> models;
-    while (rows.executeStep()) {
+    while (rows.next()) {
       StoredModel model;
       model.cell = cell;
-      model.version = rows.getColumn(0).getInt();
-      model.id = rows.getColumn(1).getString();
-      model.hash = rows.getColumn(2).getString();
-      model.level = rows.getColumn(3).getString();
-      model.batch_id = rows.getColumn(4).getString();
-      model.created_at = rows.getColumn(5).getInt64();
-      model.training_poses = rows.getColumn(6).getInt();
-      model.validation_rms = rows.getColumn(7).getDouble();
+      model.version = rows.integer(0);
+      model.id = rows.text(1);
+      model.hash = rows.text(2);
+      model.level = rows.text(3);
+      model.batch_id = rows.text(4);
+      model.created_at = rows.integer64(5);
+      model.training_poses = rows.integer(6);
+      model.validation_rms = rows.number(7);
       model.in_force = present && present->version == model.version;
-      model.trained_at = rows.getColumn(8).getInt64();
+      model.trained_at = rows.integer64(8);
       model.measured_at = optional_integer(rows, 9);
       models.push_back(std::move(model));
     }
@@ -393,23 +362,23 @@ Result<std::vector<StoredModel>> Store::models(const std::string& cell) const {
 }
 
 Result<std::string> Store::model_text(const std::string& cell, int version) const {
-  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::string> {
-    auto row = prepare(database, "SELECT content FROM models WHERE cell = ? AND version = ?", cell, version);
-    if (!row.executeStep())
+  return connection_->exclusively([&](Database& database) -> Result<std::string> {
+    auto row = prepare(database, "SELECT content FROM models WHERE cell = $1 AND version = $2", cell, version);
+    if (!row.next())
       return failure(ErrorCode::kNotFound, "cell {} has no model version {}", cell, version)
           .of("version")
           .with_value(version);
     if (is_pruned(database, "version", cell, std::to_string(version)))
       return pruned_failure(fmt::format("version {} of cell {}", version, cell)).of("version").with_value(version);
-    return row.getColumn(0).getString();
+    return row.text(0);
   });
 }
 
 Result<ReadModel> Store::read(const std::string& cell, int version) const {
   ModelOnDisk on_disk{cell, version, model_text(cell, version), "", connection_->copies->files_of(cell, version)};
-  const auto hash = connection_->exclusively([&](SQLite::Database& database) -> Result<std::string> {
-    auto row = prepare(database, "SELECT hash FROM models WHERE cell = ? AND version = ?", cell, version);
-    return row.executeStep() ? row.getColumn(0).getString() : std::string();
+  const auto hash = connection_->exclusively([&](Database& database) -> Result<std::string> {
+    auto row = prepare(database, "SELECT hash FROM models WHERE cell = $1 AND version = $2", cell, version);
+    return row.next() ? row.text(0) : std::string();
   });
   if (hash) on_disk.hash = *hash;
   auto model = read_model(on_disk, fmt::format("{}: model {}@{}", connection_->path, cell, version));
@@ -424,7 +393,7 @@ Result<CompensatedModel> Store::model(const std::string& cell, int version) cons
 }
 
 Result<std::optional<int>> Store::version_in_force(const std::string& cell) const {
-  return connection_->exclusively([&](SQLite::Database& database) -> Result<std::optional<int>> {
+  return connection_->exclusively([&](Database& database) -> Result<std::optional<int>> {
     const auto present = present_activation(database, cell);
     return present ? std::optional(present->version) : std::nullopt;
   });
@@ -443,29 +412,32 @@ Status Store::copy_model_in_force(const std::string& cell) const {
     std::string content;
   };
   const auto copies = connection_->copies->of(cell);
-  const auto present = connection_->exclusively([&](SQLite::Database& database) -> Result<std::optional<Present>> {
+  const auto present = connection_->exclusively([&](Database& database) -> Result<std::optional<Present>> {
     const auto now = present_activation(database, cell);
-    if (!now || (!copies.empty() && copies.front().activation >= now->number)) return std::nullopt;
-    auto row = prepare(database, "SELECT content FROM models WHERE cell = ? AND version = ?", cell, now->version);
-    if (!row.executeStep()) return std::nullopt;
-    return Present{*now, row.getColumn(0).getString()};
+    const std::int64_t copied = copies.empty() ? 0 : copies.front().activation;
+    const bool is_copied = now && (connection_->is_shared() ? copied == now->number : copied >= now->number);
+    if (!now || is_copied) return std::nullopt;
+    auto row = prepare(database, "SELECT content FROM models WHERE cell = $1 AND version = $2", cell, now->version);
+    if (!row.next()) return std::nullopt;
+    return Present{*now, row.text(0)};
   });
   if (!present) return tl::make_unexpected(present.error());
   if (!*present) return {};
   const Activation& now = (*present)->activation;
+  if (connection_->is_shared()) connection_->copies->forget_after(cell, now.number);
   return connection_->copies->keep(cell, now.number, now.version, (*present)->content);
 }
 
 std::vector<int> Store::versions_to_serve(const std::string& cell) const {
   const auto copies = connection_->copies->of(cell);
   std::vector<Activation> known;
-  const Status read = connection_->exclusively([&](SQLite::Database& database) -> Status {
+  const Status read = connection_->exclusively([&](Database& database) -> Status {
     auto at = present_activation(database, cell);
     while (at && known.size() < kMostToServe) {
       known.push_back(*at);
       if (!at->back) break;
-      at =
-          activation_of(prepare(database, "SELECT number, version, back FROM activations WHERE number = ?", *at->back));
+      at = activation_of(
+          prepare(database, "SELECT number, version, back FROM activations WHERE number = $1", *at->back));
     }
     return {};
   });
@@ -476,7 +448,7 @@ std::vector<int> Store::versions_to_serve(const std::string& cell) const {
     if (std::find(versions.begin(), versions.end(), version) == versions.end()) versions.push_back(version);
   };
   for (const ServedCopies::Copy& copy : copies) {
-    if (copy.activation > newest) add(copy.version);
+    if (copy.activation > newest && !connection_->is_shared()) add(copy.version);
   }
   for (const Activation& activation : known) add(activation.version);
   for (const ServedCopies::Copy& copy : copies) add(copy.version);
@@ -485,9 +457,9 @@ std::vector<int> Store::versions_to_serve(const std::string& cell) const {
 
 Status Store::take_back_from_copy(const std::string& cell) {
   const auto copies = connection_->copies->of(cell);
-  if (copies.empty() || connection_->state().why_not_written) return {};
+  if (connection_->is_shared() || copies.empty() || connection_->state().why_not_written) return {};
   const ServedCopies::Copy& newest = copies.front();
-  const auto lost = connection_->exclusively([&](SQLite::Database& database) -> Result<bool> {
+  const auto lost = connection_->exclusively([&](Database& database) -> Result<bool> {
     const auto present = present_activation(database, cell);
     return !present || present->number < newest.activation;
   });
@@ -495,11 +467,12 @@ Status Store::take_back_from_copy(const std::string& cell) {
   if (!*lost) return {};
   const auto model = model_in(newest);
   if (!model) return tl::make_unexpected(model.error());
-  const Status taken = connection_->in_transaction([&](SQLite::Database& database) -> Status {
-    auto there = prepare(database, "SELECT hash FROM models WHERE cell = ? AND version = ?", cell, newest.version);
-    if (!there.executeStep()) {
+  const Status taken = connection_->in_transaction([&](Database& database) -> Status {
+    auto there = prepare(database, "SELECT hash FROM models WHERE cell = $1 AND version = $2", cell, newest.version);
+    if (!there.next()) {
+      count_version(database, cell, newest.version);
       insert_model(database, cell, newest.version, *model, serialize(*model));
-    } else if (there.getColumn(0).getString() != model->provenance().hash) {
+    } else if (there.text(0) != model->provenance().hash) {
       return failure(ErrorCode::kConflict, "cell {}: version {} is another one than was in force", cell, newest.version)
           .in(newest.file);
     }

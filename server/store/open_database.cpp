@@ -1,7 +1,5 @@
 #include "server/store/open_database.h"
 
-#include <sqlite3.h>
-
 #include <array>
 #include <exception>
 #include <filesystem>
@@ -17,7 +15,7 @@ namespace fs = std::filesystem;
 
 /// What an attempt to open the file came to.
 struct Attempt {
-  std::unique_ptr<SQLite::Database> file;
+  std::unique_ptr<SqliteDatabase> file;
   std::optional<Error> why_not;
   bool of_the_disk = false;
 };
@@ -29,8 +27,8 @@ Attempt attempt(const std::string& path, const Open& open) {
     const Status ready = open(made.file);
     if (!ready) return {nullptr, ready.error(), false};
     return made;
-  } catch (const SQLite::Exception& error) {
-    return {nullptr, failure_of(error, path).value(), is_of_the_disk(error)};
+  } catch (const DatabaseError& error) {
+    return {nullptr, failure_of(error, path).value(), error.kind() == DatabaseError::Kind::kAway};
   } catch (const std::exception& error) {
     return {nullptr, failure(ErrorCode::kInternal, "{}", error.what()).in(path).value(), false};
   }
@@ -51,7 +49,7 @@ Status check_there(const std::string& path, const ServedCopies& copies) {
 }
 
 /// Gives the copies the store's id. Refuses a store that is not the one whose models were served here.
-Status check_identity(SQLite::Database& database, const std::string& path, ServedCopies& copies) {
+Status check_identity(Database& database, const std::string& path, ServedCopies& copies) {
   const auto known = copies.stores();
   const auto id = identity_of(database, known.size() == 1 ? known.front() : "");
   if (!id) return tl::make_unexpected(id.error());
@@ -67,9 +65,9 @@ Status check_identity(SQLite::Database& database, const std::string& path, Serve
 }
 
 Attempt open_for_writing(const std::string& path, ServedCopies& copies) {
-  return attempt(path, [&](std::unique_ptr<SQLite::Database>& file) -> Status {
+  return attempt(path, [&](std::unique_ptr<SqliteDatabase>& file) -> Status {
     if (auto fine = check_there(path, copies); !fine) return fine;
-    file = std::make_unique<SQLite::Database>(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout);
+    file = std::make_unique<SqliteDatabase>(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout);
     if (auto ready = prepare_file(*file, path); !ready) return ready;
     return check_identity(*file, path, copies);
   });
@@ -83,9 +81,9 @@ Attempt open_for_reading(const std::string& path, ServedCopies& copies) {
                                      {immutable_uri(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI}}};
   Attempt last;
   for (const auto& [name, flags] : ways) {
-    last = attempt(path, [&, named = name, how = flags](std::unique_ptr<SQLite::Database>& file) -> Status {
-      file = std::make_unique<SQLite::Database>(named, how, kBusyTimeout);
-      if (how == SQLite::OPEN_READWRITE) file->exec("PRAGMA locking_mode = EXCLUSIVE");
+    last = attempt(path, [&, named = name, how = flags](std::unique_ptr<SqliteDatabase>& file) -> Status {
+      file = std::make_unique<SqliteDatabase>(named, how, kBusyTimeout);
+      if (how == SQLite::OPEN_READWRITE) file->execute("PRAGMA locking_mode = EXCLUSIVE");
       if (auto ours = check_readable(*file, path); !ours) return ours;
       return check_identity(*file, path, copies);
     });
@@ -136,9 +134,9 @@ Status check_state(const std::string& path, const std::optional<StoreMark>& mark
   };
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return wrong("was replaced by what is no file");
-  const Attempt look = attempt(path, [&](std::unique_ptr<SQLite::Database>& file) -> Status {
+  const Attempt look = attempt(path, [&](std::unique_ptr<SqliteDatabase>& file) -> Status {
     file =
-        std::make_unique<SQLite::Database>(immutable_uri(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
+        std::make_unique<SqliteDatabase>(immutable_uri(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
     if (auto ours = check_readable(*file, path); !ours) return ours;
     const auto is = mark_of(*file);
     if (!mark) return {};
@@ -151,30 +149,6 @@ Status check_state(const std::string& path, const std::optional<StoreMark>& mark
   if (look.file) return {};
   if (look.why_not->code == ErrorCode::kBusy && !look.of_the_disk) return tl::make_unexpected(*look.why_not);
   return wrong("was replaced or written over by another program: " + look.why_not->message);
-}
-
-bool is_of_the_disk(const SQLite::Exception& error) {
-  switch (error.getErrorCode()) {
-    case SQLITE_FULL:
-    case SQLITE_IOERR:
-    case SQLITE_READONLY:
-    case SQLITE_CANTOPEN:
-    case SQLITE_PERM:
-    case SQLITE_PROTOCOL:
-    case SQLITE_BUSY:  // another program holds it locked
-    case SQLITE_LOCKED:
-      return true;
-    default:
-      return false;
-  }
-}
-
-Failure failure_of(const SQLite::Exception& error, const std::string& path) {
-  Failure said = failure(is_of_the_disk(error) ? ErrorCode::kBusy : ErrorCode::kInternal, "{} (SQLite error {})",
-                         error.what(), error.getExtendedErrorCode())
-                     .in(path);
-  if (!is_of_the_disk(error)) return said;
-  return std::move(said).next("it is tried again by itself; ask again later");
 }
 
 }  // namespace trammel

@@ -1,12 +1,11 @@
 #pragma once
 
-#include <SQLiteCpp/SQLiteCpp.h>
-
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "server/base/result.h"
+#include "server/store/database/sqlite_database.h"
 #include "server/store/schema.h"
 #include "server/store/served_copies.h"
 
@@ -16,8 +15,8 @@ constexpr int kBusyTimeout = 5000;  // ms to wait while another program reads th
 
 /// A store's file as far as it could be opened.
 struct OpenedDatabase {
-  std::unique_ptr<SQLite::Database> file;  ///< null: nothing of it can be read, and only copies are there
-  std::optional<Error> why_not_written;    ///< set: it can be read at most
+  std::unique_ptr<SqliteDatabase> file;  ///< null: nothing of it can be read, and only copies are there
+  std::optional<Error> why_not_written;  ///< set: it can be read at most
 };
 
 /// Opens the file for writing; where the disk does not let it, for reading; where that fails too and there are copies
@@ -34,12 +33,5 @@ struct OpenedDatabase {
 /// Whether the file, which this process does not have open, is a store in the state of `mark` (empty: in any state).
 /// Looks at the file alone, not at a journal beside it, and leaves both as they are.
 [[nodiscard]] Status check_state(const std::string& path, const std::optional<StoreMark>& mark);
-
-/// Whether the error says that the file cannot be written now: the disk is full, read-only or broken, or another
-/// program holds it locked.
-[[nodiscard]] bool is_of_the_disk(const SQLite::Exception& error);
-
-/// The failure for a caller: kBusy where the disk may let it be written again, kInternal where the file is damaged.
-[[nodiscard]] Failure failure_of(const SQLite::Exception& error, const std::string& path);
 
 }  // namespace trammel

@@ -1,6 +1,7 @@
 #include <utility>
 
 #include "server/store/audit_rows.h"
+#include "server/store/cell_rows.h"
 #include "server/store/connection.h"
 #include "server/store/store.h"
 
@@ -9,11 +10,10 @@
 namespace trammel {
 namespace {
 
-std::optional<ReplicaRecord> read_record(SQLite::Database& database) {
-  SQLite::Statement row(database, "SELECT epoch, writes, follows, told FROM replica");
-  if (!row.executeStep()) return std::nullopt;
-  return ReplicaRecord{static_cast<std::uint64_t>(row.getColumn(0).getInt64()), row.getColumn(1).getInt() != 0,
-                       row.getColumn(2).getString(), row.getColumn(3).getString()};
+std::optional<ReplicaRecord> read_record(Database& database) {
+  Rows row = prepare(database, "SELECT epoch, writes, follows, told FROM replica");
+  if (!row.next()) return std::nullopt;
+  return ReplicaRecord{static_cast<std::uint64_t>(row.integer64(0)), row.truth(1), row.text(2), row.text(3)};
 }
 
 std::string spoken(const std::optional<ReplicaRecord>& record) {
@@ -25,28 +25,28 @@ std::string spoken(const std::optional<ReplicaRecord>& record) {
 }  // namespace
 
 Result<ReplicaView> Store::replica_view() const {
-  return connection_->exclusively([](SQLite::Database& database) -> Result<ReplicaView> {
+  return connection_->exclusively([](Database& database) -> Result<ReplicaView> {
     ReplicaView view{read_record(database), {}, {}};
-    SQLite::Statement rows(database,
-                           "SELECT a.cell, a.version, m.hash FROM "
-                           "(SELECT cell, MAX(number) AS number FROM activations GROUP BY cell) AS newest "
-                           "JOIN activations AS a USING (number) "
-                           "JOIN models AS m ON m.cell = a.cell AND m.version = a.version");
-    while (rows.executeStep())
-      view.cells[rows.getColumn(0).getString()] = {rows.getColumn(1).getInt(), rows.getColumn(2).getString()};
-    SQLite::Statement numbers(database,
-                              "SELECT cell, MAX(number) FROM (SELECT cell, MAX(version) AS number FROM models "
-                              "GROUP BY cell UNION ALL SELECT cell, newest FROM versions_elsewhere) GROUP BY cell");
-    while (numbers.executeStep()) view.newest[numbers.getColumn(0).getString()] = numbers.getColumn(1).getInt();
+    Rows rows = prepare(database,
+                        "SELECT a.cell, a.version, m.hash FROM "
+                        "(SELECT cell, MAX(number) AS number FROM activations GROUP BY cell) AS newest "
+                        "JOIN activations AS a USING (number) "
+                        "JOIN models AS m ON m.cell = a.cell AND m.version = a.version");
+    while (rows.next()) view.cells[rows.text(0)] = {rows.integer(1), rows.text(2)};
+    Rows numbers = prepare(database, "SELECT cell, last_version FROM cells");
+    while (numbers.next()) view.newest[numbers.text(0)] = numbers.integer(1);
     return view;
   });
 }
 
 Status Store::keep_replica_record(const ReplicaRecord& record, const std::string& why) {
-  return connection_->in_transaction([&](SQLite::Database& database) -> Status {
+  return connection_->in_transaction([&](Database& database) -> Status {
     const auto before = read_record(database);
     if (before == record) return {};
-    change(database, "INSERT OR REPLACE INTO replica (one, epoch, writes, follows, told) VALUES (1, ?, ?, ?, ?)",
+    change(database,
+           "INSERT INTO replica (one, epoch, writes, follows, told) VALUES (1, $1, $2, $3, $4) ON CONFLICT (one) DO "
+           "UPDATE "
+           "SET epoch = excluded.epoch, writes = excluded.writes, follows = excluded.follows, told = excluded.told",
            static_cast<std::int64_t>(record.epoch), record.writes ? 1 : 0, record.follows, record.told);
     if (spoken(before) != spoken(record))
       record_audit(database, {"", "replica", "part", spoken(before), spoken(record), why});
@@ -59,11 +59,8 @@ Status Store::number_after(const std::string& cell, int newest) {
     return refused("cell {}: version {} of another server, limit {}", cell, newest, kHighestTold)
         .of("version")
         .beyond(newest, kHighestTold);
-  return connection_->in_transaction([&](SQLite::Database& database) -> Status {
-    change(database,
-           "INSERT INTO versions_elsewhere (cell, newest) VALUES (?, ?) "
-           "ON CONFLICT (cell) DO UPDATE SET newest = MAX(newest, excluded.newest)",
-           cell, newest);
+  return connection_->in_transaction([&](Database& database) -> Status {
+    count_version(database, cell, newest);
     return {};
   });
 }

@@ -97,7 +97,7 @@ Status write_part(const std::string& path, const std::string& content) {
 
 std::string ServedCopies::folder() const {
   const MutexLock lock(mutex_);
-  return store_.empty() ? "" : root_ + "/" + store_;
+  return store_.empty() || root_.empty() ? "" : root_ + "/" + store_;
 }
 
 std::vector<std::string> ServedCopies::stores() const {
@@ -118,7 +118,7 @@ Status ServedCopies::belong_to(const std::string& store, bool served) {
     store_ = store;
   }
   std::error_code error;
-  if (served) fs::create_directories(folder(), error);
+  if (served && !root_.empty()) fs::create_directories(folder(), error);
   if (error) return failure(ErrorCode::kInternal, "cannot be created: {}", error.message()).in(folder());
   return {};
 }
@@ -169,6 +169,13 @@ Status ServedCopies::keep(const std::string& cell, std::int64_t activation, int 
     if (!newest_of_its_version || seen.size() > kVersionsKept) fs::remove(copy.file, error);
   }
   return {};
+}
+
+void ServedCopies::forget_after(const std::string& cell, std::int64_t activation) const {
+  std::error_code error;
+  for (const Copy& copy : of(cell)) {
+    if (copy.activation > activation) fs::remove(copy.file, error);
+  }
 }
 
 }  // namespace trammel

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/base/mutex.h"
@@ -9,12 +10,14 @@
 
 namespace trammel {
 
-/// The last models in force of each cell as plain files beside the store: what is served where the store cannot be
-/// read. They lie in `<store>.models/<id of the store>/<hash of the cell's name>/`, one file a version, the newest
-/// three. Thread-safe; one thread at a time keeps copies of a cell.
+/// The last models in force of each cell as plain files: what is served where the store cannot be read. They lie in
+/// `<root>/<id of the store>/<hash of the cell's name>/`, one file a version, the newest three. Beside a file the root
+/// is
+/// `<store>.models`. Thread-safe; one thread at a time keeps copies of a cell.
 class ServedCopies {
  public:
-  explicit ServedCopies(const std::string& store) : root_(store + ".models") {}
+  /// Without a root none are kept.
+  explicit ServedCopies(std::string root) : root_(std::move(root)) {}
 
   struct Copy {
     std::int64_t activation = 0;  ///< number of the activation that put it in force: the larger, the newer
@@ -32,6 +35,8 @@ class ServedCopies {
   /// On disk when it returns. Takes the place of an older copy of the same version.
   [[nodiscard]] Status keep(const std::string& cell, std::int64_t activation, int version,
                             const std::string& content) const;
+  /// Takes copies away that were put in force later: of a history that is no more.
+  void forget_after(const std::string& cell, std::int64_t activation) const;
   [[nodiscard]] const std::string& root() const { return root_; }
 
  private:

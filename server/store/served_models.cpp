@@ -19,12 +19,12 @@ constexpr int kMostLookedAt = 100;  // versions of a cell, as at a start
 
 /// Opens the file to be read and runs `work(database)` on one moment of it.
 template <typename Work>
-auto reading(const std::string& path, const Work& work) -> decltype(work(std::declval<SQLite::Database&>())) {
+auto reading(const std::string& path, const Work& work) -> decltype(work(std::declval<Database&>())) {
   try {
-    SQLite::Database database(uri_to_look_at(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
-    const SQLite::Transaction moment(database);
+    SqliteDatabase database(uri_to_look_at(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
+    const Transaction moment(database, Transaction::For::kReading);
     return work(database);
-  } catch (const SQLite::Exception& error) {
+  } catch (const DatabaseError& error) {
     return failure(ErrorCode::kInternal, "cannot be read: {}", error.what()).in(path);
   }
 }
@@ -44,10 +44,10 @@ Result<CompensatedModel> model_of_hash(const ModelOnDisk& on_disk, const std::st
 }
 
 /// The copies of the store that is open.
-void find_copies(SQLite::Database& database, ServedCopies& copies) {
-  if (!database.tableExists("store_identity")) return;
-  SQLite::Statement id(database, "SELECT id FROM store_identity WHERE id != ''");
-  if (id.executeStep()) static_cast<void>(copies.belong_to(id.getColumn(0).getString(), false));
+void find_copies(Database& database, ServedCopies& copies) {
+  if (!database.has_table("store_identity")) return;
+  Rows id = prepare(database, "SELECT id FROM store_identity WHERE id != ''");
+  if (id.next()) static_cast<void>(copies.belong_to(id.text(0), false));
 }
 
 }  // namespace
@@ -69,39 +69,37 @@ Result<ReadModel> read_model(const ModelOnDisk& on_disk, const std::string& wher
 Result<ServedModels> ServedModels::open(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error) || std::filesystem::file_size(path, error) == 0) return ServedModels("");
-  return reading(path, [&](SQLite::Database& database) -> Result<ServedModels> {
-    if (database.execAndGet("PRAGMA application_id").getInt() != kApplicationId) return refused("no store").in(path);
+  return reading(path, [&](Database& database) -> Result<ServedModels> {
+    if (integer_of(database, "PRAGMA application_id") != kApplicationId) return refused("no store").in(path);
     return ServedModels(path);
   });
 }
 
 Result<bool> ServedModels::has(const std::string& cell) const {
   if (path_.empty()) return false;
-  return reading(path_, [&](SQLite::Database& database) -> Result<bool> {
-    return prepare(database, "SELECT 1 FROM activations WHERE cell = ?", cell).executeStep();
+  return reading(path_, [&](Database& database) -> Result<bool> {
+    return exists(database, "SELECT 1 FROM activations WHERE cell = $1", cell);
   });
 }
 
 Result<bool> ServedModels::find(const std::string& cell, const ModelVisitor& serves) const {
   if (path_.empty()) return false;
-  return reading(path_, [&](SQLite::Database& database) -> Result<bool> {
-    ServedCopies copies(path_);
+  return reading(path_, [&](Database& database) -> Result<bool> {
+    ServedCopies copies(path_ + ".models");
     find_copies(database, copies);
     auto at =
         prepare(database,
                 "WITH RECURSIVE chain (number, version, back, step) AS ("
-                "SELECT * FROM (SELECT number, version, back, 0 FROM activations WHERE cell = ?1 "
-                "ORDER BY number DESC LIMIT 1) UNION ALL "
+                "SELECT * FROM (SELECT number, version, back, 0 FROM activations WHERE cell = $1 "
+                "ORDER BY number DESC LIMIT 1) AS present UNION ALL "
                 "SELECT a.number, a.version, a.back, step + 1 FROM chain JOIN activations a ON a.number = chain.back "
-                "WHERE step + 1 < ?2) "
+                "WHERE step + 1 < $2) "
                 "SELECT models.version, models.content, models.hash FROM chain JOIN models "
-                "ON models.cell = ?1 AND models.version = chain.version ORDER BY step",
+                "ON models.cell = $1 AND models.version = chain.version ORDER BY step",
                 cell, kMostLookedAt);
-    while (at.executeStep()) {
-      const int version = at.getColumn(0).getInt();
-      if (serves({cell, version, at.getColumn(1).getString(), at.getColumn(2).getString(),
-                  copies.files_of(cell, version)}))
-        return true;
+    while (at.next()) {
+      const int version = at.integer(0);
+      if (serves({cell, version, at.text(1), at.text(2), copies.files_of(cell, version)})) return true;
     }
     return false;
   });

@@ -7,24 +7,19 @@
 #include "server/base/unix_time.h"
 #include "server/store/audit_rows.h"
 #include "server/store/connection.h"
-#include "server/store/store_file.h"
+#include "server/store/file_connection.h"
+#include "server/store/shared_connection.h"
+#include "server/store/store_place.h"
 
 namespace trammel {
 
 Store::Store(std::unique_ptr<StoreConnection> connection) : connection_(std::move(connection)) {}
 Store::~Store() = default;
 
-Result<std::unique_ptr<Store>> Store::open(const std::string& path) {
-  auto lock = WriterLock::take(path);
-  if (!lock) return tl::make_unexpected(lock.error());
-  auto copies = std::make_unique<ServedCopies>(path);
-  StoreFile file(path);
-  if (auto held = file.hold(); !held) return tl::make_unexpected(held.error());
-  auto opened = open_database(path, *copies);
-  if (!opened) return tl::make_unexpected(opened.error());
-  if (auto held = file.hold(); !held) return tl::make_unexpected(held.error());  // where it was not there before
-  return std::unique_ptr<Store>(new Store(std::make_unique<StoreConnection>(std::move(*lock), std::move(file), path,
-                                                                            std::move(*opened), std::move(copies))));
+Result<std::unique_ptr<Store>> Store::open(const std::string& place, const std::string& cache) {
+  auto connection = is_postgres_url(place) ? SharedConnection::open(place, cache) : FileConnection::open(place);
+  if (!connection) return tl::make_unexpected(connection.error());
+  return std::unique_ptr<Store>(new Store(std::move(*connection)));
 }
 
 StoreState Store::state() const { return connection_->state(); }
@@ -36,7 +31,7 @@ namespace {
 void look_at_clock(StoreConnection& connection) {
   const auto step = connection.note_clock();
   if (!step) return;
-  static_cast<void>(connection.in_transaction([&step](SQLite::Database& database) -> Status {
+  static_cast<void>(connection.in_transaction([&step](Database& database) -> Status {
     const std::int64_t now = unix_now();
     record_audit(database, {"", "clock", "clock", fmt::format("{} s since 1970", now - step->count()),
                             fmt::format("{} s since 1970", now), fmt::format("set by {:+} s", step->count())});
@@ -48,13 +43,7 @@ void look_at_clock(StoreConnection& connection) {
 
 Status Store::try_again() {
   look_at_clock(*connection_);
-  if (connection_->is_in_order()) return {};
-  return connection_->in_transaction([](SQLite::Database& database) -> Status {
-    // Of an update that changes nothing SQLite writes nothing.
-    change(database, "INSERT INTO store_identity (id) VALUES ('')");
-    change(database, "DELETE FROM store_identity WHERE id = ''");
-    return {};
-  });
+  return connection_->try_again();
 }
 
 bool Store::wait_until_writable(const std::stop_token& stop) {

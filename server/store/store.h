@@ -18,7 +18,7 @@
 #include "server/store/store_state.h"
 
 /// Everything that survives a restart: batches, jobs, models and their history, in one SQLite file (WAL,
-/// synchronous=FULL).
+/// synchronous=FULL), or in one PostgreSQL database where several servers share them.
 namespace trammel {
 
 struct StoredBatch {
@@ -134,12 +134,12 @@ struct ReplicaView {
   std::map<std::string, int> newest = {};       ///< the highest number of a version, here or given elsewhere
 };
 
-struct StoreConnection;
+class StoreConnection;
 
-/// Thread-safe: one connection behind one lock. Every function that changes something is one transaction, and it is on
-/// disk when the function returns. Errors of the disk or the database name the file: kBusy where the disk does not let
-/// it be written now (full, read-only, broken) and may later, kInternal where the file is damaged. Damage of one row is
-/// an error of what reads that row, and of nothing else.
+/// Thread-safe: a file is one connection behind one lock. Every function that changes something is one transaction, and
+/// it is on disk when the function returns. Errors of the disk or the database name the file: kBusy where the disk does
+/// not let it be written now (full, read-only, broken) and may later, kInternal where the file is damaged. Damage of
+/// one row is an error of what reads that row, and of nothing else.
 ///
 /// Of each cell the last three versions in force are kept as plain files beside the store, too (`<file>.models`), and
 /// taken where the store does not give them.
@@ -150,7 +150,10 @@ class Store {
   /// that is possible: state(). Of a file that is damaged, emptied, gone or of another store the copies are there, and
   /// nothing is written to it; without copies it is refused (kInternal), as is a file of another program or of a newer
   /// schema (kRefused). The file `<file>.lock` beside it holds the writer's process id.
-  [[nodiscard]] static Result<std::unique_ptr<Store>> open(const std::string& path);
+  /// A URL of PostgreSQL is a store that several servers share: `cache` is the folder of its copies (empty: none are
+  /// kept). One that is away is opened all the same, and state() says so. Refuses (kRefused) an empty database, one of
+  /// another program or of a newer schema, and a role that is not let in.
+  [[nodiscard]] static Result<std::unique_ptr<Store>> open(const std::string& place, const std::string& cache = "");
   ~Store();
 
   /// Never waits for the disk.

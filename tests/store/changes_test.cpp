@@ -3,6 +3,7 @@
 #include "server/base/hash.h"
 #include "server/store/store.h"
 #include "tests/support/demand.h"
+#include "tests/support/postgres.h"
 #include "tests/support/small_cell.h"
 #include "tests/support/temporary_folder.h"
 
@@ -11,8 +12,10 @@ namespace {
 
 using test::demand;
 
-class ChangesTest : public testing::Test {
+/// On each kind of database.
+class ChangesTest : public testing::TestWithParam<std::string> {
  protected:
+  static void SetUpTestSuite() { test::Postgres::of_program(); }
   void SetUp() override {
     for (int version = 1; version <= 3; ++version)
       ASSERT_TRUE(store_->add_model("cell-7", test::nominal_model(cell_, version), 0, true, ""));
@@ -31,12 +34,16 @@ class ChangesTest : public testing::Test {
 
   const ChangeId id_{"robot-3:17", "what is asked for"};
   test::TemporaryFolder folder_;
-  const std::string path_ = folder_.file("trammel.db");
+  const std::string path_ =
+      GetParam() == "file" ? folder_.file("trammel.db") : test::Postgres::of_program().new_store();
   const std::shared_ptr<const Cell> cell_ = test::small_cell("cell-7");
   std::unique_ptr<Store> store_ = demand(Store::open(path_));
 };
 
-TEST_F(ChangesTest, ARollbackThatIsRepeatedAfterARestartRollsBackOnce) {
+INSTANTIATE_TEST_SUITE_P(, ChangesTest, testing::Values("file", "postgresql"),
+                         [](const auto& kind) { return kind.param; });
+
+TEST_P(ChangesTest, ARollbackThatIsRepeatedAfterARestartRollsBackOnce) {
   EXPECT_EQ(demand(store_->rollback("cell-7", 1, id_)), 2);
   restart();
   EXPECT_EQ(demand(store_->rollback("cell-7", 1, id_)), 2);
@@ -44,14 +51,14 @@ TEST_F(ChangesTest, ARollbackThatIsRepeatedAfterARestartRollsBackOnce) {
   EXPECT_EQ(demand(store_->outcome_of(id_))->version, 2);
 }
 
-TEST_F(ChangesTest, ARepeatSaysWhatCameOfTheFirstThoughOthersChangedThingsSince) {
+TEST_P(ChangesTest, ARepeatSaysWhatCameOfTheFirstThoughOthersChangedThingsSince) {
   ASSERT_TRUE(store_->activate("cell-7", 1, id_));
   ASSERT_TRUE(store_->activate("cell-7", 3));
   ASSERT_TRUE(store_->activate("cell-7", 1, id_));
   EXPECT_EQ(in_force(), 3);
 }
 
-TEST_F(ChangesTest, ATrainingOrADiagnosisThatIsAskedForAgainIsQueuedOnce) {
+TEST_P(ChangesTest, ATrainingOrADiagnosisThatIsAskedForAgainIsQueuedOnce) {
   const std::string csv = "q1_deg\n1\n";
   const auto brought = demand(store_->add_batch({"cell-7", "lt-07", csv, sha256_hex(csv), "client:1", 1, 1}, job()));
   const auto first = demand(store_->add_job(job(), false, id_));
@@ -64,7 +71,7 @@ TEST_F(ChangesTest, ATrainingOrADiagnosisThatIsAskedForAgainIsQueuedOnce) {
   EXPECT_EQ(demand(store_->unfinished_jobs()).size(), 3u);
 }
 
-TEST_F(ChangesTest, WhatWasRefusedLeavesNothingBehindAndMayBeAskedForAgain) {
+TEST_P(ChangesTest, WhatWasRefusedLeavesNothingBehindAndMayBeAskedForAgain) {
   EXPECT_FALSE(store_->activate("cell-7", 9, id_));
   EXPECT_FALSE(demand(store_->outcome_of(id_)));
   ASSERT_TRUE(store_->add_model("cell-7", test::nominal_model(cell_, 4), 0, false, ""));
@@ -72,7 +79,7 @@ TEST_F(ChangesTest, WhatWasRefusedLeavesNothingBehindAndMayBeAskedForAgain) {
   EXPECT_EQ(in_force(), 4);
 }
 
-TEST_F(ChangesTest, AnIdStandsForOneChangeOnly) {
+TEST_P(ChangesTest, AnIdStandsForOneChangeOnly) {
   ASSERT_TRUE(store_->activate("cell-7", 1, id_));
   const auto other = store_->rollback("cell-7", 1, {id_.id, "something else"});
   ASSERT_FALSE(other);
@@ -81,7 +88,7 @@ TEST_F(ChangesTest, AnIdStandsForOneChangeOnly) {
   EXPECT_EQ(in_force(), 1);
 }
 
-TEST_F(ChangesTest, WithoutAnIdEveryRequestIsAChange) {
+TEST_P(ChangesTest, WithoutAnIdEveryRequestIsAChange) {
   EXPECT_EQ(demand(store_->rollback("cell-7")), 2);
   EXPECT_EQ(demand(store_->rollback("cell-7")), 1);
 }

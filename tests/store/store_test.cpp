@@ -13,6 +13,7 @@
 
 #include "server/base/hash.h"
 #include "server/compensate/model_file.h"
+#include "tests/support/postgres.h"
 #include "tests/support/refusal.h"
 #include "tests/support/small_cell.h"
 #include "tests/support/temporary_folder.h"
@@ -23,11 +24,13 @@ namespace {
 using test::Refusal;
 using test::refusal_of;
 
-class StoreTest : public testing::Test {
+/// A store, and what the tests do with it.
+class StoreUnderTest {
  protected:
-  void SetUp() override { open(); }
+  explicit StoreUnderTest(const std::string& database)
+      : path_(database.empty() ? folder_.file("trammel.db") : database) {}
   void open() {
-    auto opened = Store::open(path_);
+    auto opened = Store::open(path_, folder_.file("cache"));
     ASSERT_TRUE(opened) << opened.error().message;
     store_ = std::move(*opened);
   }
@@ -54,12 +57,29 @@ class StoreTest : public testing::Test {
   int in_force() { return store_->version_in_force("cell-7")->value_or(0); }
 
   test::TemporaryFolder folder_;
-  const std::string path_ = folder_.file("trammel.db");
+  const std::string path_;
   const std::shared_ptr<const Cell> cell_ = test::small_cell("cell-7");
   std::unique_ptr<Store> store_;
 };
 
-TEST_F(StoreTest, KeepsAnAcceptedBatchAndItsJobAcrossARestart) {
+/// On each kind of database.
+class StoreTest : public testing::TestWithParam<std::string>, protected StoreUnderTest {
+ protected:
+  StoreTest() : StoreUnderTest(GetParam() == "file" ? "" : test::Postgres::of_program().new_store()) {}
+  static void SetUpTestSuite() { test::Postgres::of_program(); }
+  void SetUp() override { open(); }
+};
+INSTANTIATE_TEST_SUITE_P(, StoreTest, testing::Values("file", "postgresql"),
+                         [](const auto& kind) { return kind.param; });
+
+/// What is said of files alone.
+class StoreFileTest : public testing::Test, protected StoreUnderTest {
+ protected:
+  StoreFileTest() : StoreUnderTest("") {}
+  void SetUp() override { open(); }
+};
+
+TEST_P(StoreTest, KeepsAnAcceptedBatchAndItsJobAcrossARestart) {
   const auto accepted = store_->add_batch(batch("lt-07"), job());
   ASSERT_TRUE(accepted) << accepted.error().message;
   EXPECT_EQ(accepted->batch_ids, std::vector<std::string>{"lt-07"});
@@ -77,14 +97,14 @@ TEST_F(StoreTest, KeepsAnAcceptedBatchAndItsJobAcrossARestart) {
   EXPECT_EQ(unfinished->front().created_at, 1700000001);
 }
 
-TEST_F(StoreTest, KeepsEveryByteOfABatch) {
+TEST_P(StoreTest, KeepsEveryByteOfABatch) {
   const std::string bytes("# \xC3\xA4 \xFF\0 end\r\n", 13);
   ASSERT_TRUE(store_->add_batch(batch("odd", bytes), job()));
   reopen();
   EXPECT_EQ(store_->batch("cell-7", "odd")->csv, bytes);
 }
 
-TEST_F(StoreTest, TheSameRequestAgainReturnsTheJobItMadeThen) {
+TEST_P(StoreTest, TheSameRequestAgainReturnsTheJobItMadeThen) {
   const auto first = store_->add_batch(batch("lt-07"), job());
   ASSERT_TRUE(store_->add_batch(batch("lt-08", "x", "client:2"), job()));
   const auto again = store_->add_batch(batch("lt-07"), job());
@@ -94,7 +114,7 @@ TEST_F(StoreTest, TheSameRequestAgainReturnsTheJobItMadeThen) {
   EXPECT_EQ(store_->unfinished_jobs()->size(), 2u);
 }
 
-TEST_F(StoreTest, TheSameContentAgainFromAClientThatLostItsReceiptIsTheSameJob) {
+TEST_P(StoreTest, TheSameContentAgainFromAClientThatLostItsReceiptIsTheSameJob) {
   const auto first = store_->add_batch(batch("lt-07"), job());
   const auto again = store_->add_batch(batch("lt-07", batch("lt-07").csv, "client:2"), job());
   ASSERT_TRUE(first && again);
@@ -102,7 +122,7 @@ TEST_F(StoreTest, TheSameContentAgainFromAClientThatLostItsReceiptIsTheSameJob) 
   EXPECT_EQ(store_->unfinished_jobs()->size(), 1u);
 }
 
-TEST_F(StoreTest, RefusesAnIdThatTheCellHasWithOtherContent) {
+TEST_P(StoreTest, RefusesAnIdThatTheCellHasWithOtherContent) {
   ASSERT_TRUE(store_->add_batch(batch("lt-07"), job()));
   const auto other_content = store_->add_batch(batch("lt-07", "other"), job());
   ASSERT_FALSE(other_content);
@@ -111,7 +131,7 @@ TEST_F(StoreTest, RefusesAnIdThatTheCellHasWithOtherContent) {
   EXPECT_EQ(store_->batch("cell-7", "lt-07")->csv, batch("lt-07").csv);
 }
 
-TEST_F(StoreTest, IdsAreUniqueWithinACellOnly) {
+TEST_P(StoreTest, IdsAreUniqueWithinACellOnly) {
   ASSERT_TRUE(store_->add_batch(batch("lt-07"), job()));
   StoredBatch elsewhere = batch("lt-07", "elsewhere");
   StoredJob its_job = job();
@@ -119,7 +139,7 @@ TEST_F(StoreTest, IdsAreUniqueWithinACellOnly) {
   EXPECT_TRUE(store_->add_batch(elsewhere, its_job));
 }
 
-TEST_F(StoreTest, ListsBatchesOldestFirstWithoutTheirText) {
+TEST_P(StoreTest, ListsBatchesOldestFirstWithoutTheirText) {
   ASSERT_TRUE(store_->add_batch(batch("z", "1", "a"), job()));
   ASSERT_TRUE(store_->add_batch(batch("a", "2", "b"), job()));
   const auto batches = store_->batches("cell-7");
@@ -130,7 +150,7 @@ TEST_F(StoreTest, ListsBatchesOldestFirstWithoutTheirText) {
   EXPECT_EQ(batches->back().hash, sha256_hex("2"));
 }
 
-TEST_F(StoreTest, QueuesAJobOverSeveralBatchesInTheOrderAskedFor) {
+TEST_P(StoreTest, QueuesAJobOverSeveralBatchesInTheOrderAskedFor) {
   ASSERT_TRUE(store_->add_batch(batch("a", "1", "r1"), job()));
   ASSERT_TRUE(store_->add_batch(batch("b", "2", "r2"), job()));
   StoredJob both = job();
@@ -145,7 +165,7 @@ TEST_F(StoreTest, QueuesAJobOverSeveralBatchesInTheOrderAskedFor) {
   EXPECT_EQ(read->bias, "matern52");
 }
 
-TEST_F(StoreTest, KeepsADiagnosisItsBatchAndItsFindingsAcrossARestart) {
+TEST_P(StoreTest, KeepsADiagnosisItsBatchAndItsFindingsAcrossARestart) {
   StoredJob asked = job();
   asked.kind = JobKind::kDiagnose;
   const auto queued = store_->add_diagnosis(asked, {"q1_deg\n1\n", true, "", ""});
@@ -163,7 +183,7 @@ TEST_F(StoreTest, KeepsADiagnosisItsBatchAndItsFindingsAcrossARestart) {
   EXPECT_EQ(store_->diagnosis(queued->id + 1).error().code, ErrorCode::kNotFound);
 }
 
-TEST_F(StoreTest, KeepsACheckOfTheRobotsHealthAcrossARestart) {
+TEST_P(StoreTest, KeepsACheckOfTheRobotsHealthAcrossARestart) {
   StoredJob asked = job();
   asked.kind = JobKind::kCheck;
   const auto queued = store_->add_diagnosis(asked, {"q1_deg\n1\n", false, "", ""});
@@ -174,7 +194,7 @@ TEST_F(StoreTest, KeepsACheckOfTheRobotsHealthAcrossARestart) {
   EXPECT_EQ(store_->audit()->rows.back().what, "check asked");
 }
 
-TEST_F(StoreTest, KeepsThePagesOfTheLastDiagnosesOnlyButAllTheirFindings) {
+TEST_P(StoreTest, KeepsThePagesOfTheLastDiagnosesOnlyButAllTheirFindings) {
   std::vector<std::int64_t> jobs;
   for (int i = 0; i < 22; ++i) {
     StoredJob asked = job();
@@ -187,7 +207,7 @@ TEST_F(StoreTest, KeepsThePagesOfTheLastDiagnosesOnlyButAllTheirFindings) {
   EXPECT_EQ(store_->diagnosis(jobs[2])->page, "<html>");
 }
 
-TEST_F(StoreTest, KeepsWhyABatchIsInQuarantineUntilItIsReleased) {
+TEST_P(StoreTest, KeepsWhyABatchIsInQuarantineUntilItIsReleased) {
   ASSERT_TRUE(store_->add_batch(batch("lt-07"), job()));
   ASSERT_TRUE(store_->set_quarantine("cell-7", "lt-07", "another tool"));
   reopen();
@@ -199,7 +219,7 @@ TEST_F(StoreTest, KeepsWhyABatchIsInQuarantineUntilItIsReleased) {
   EXPECT_EQ(store_->set_quarantine("cell-7", "lt-08", "x").error().code, ErrorCode::kNotFound);
 }
 
-class FollowedBatch : public StoreTest {
+class FollowedBatch : public StoreFileTest {
  protected:
   void SetUp() override {
     open();
@@ -283,7 +303,7 @@ TEST_F(FollowedBatch, EachChangeOfItIsCounted) {
   EXPECT_EQ(store_->changes_made().value(), after.value()) << "it was so";
 }
 
-TEST_F(StoreTest, ANumberThatAnotherServerGaveIsNotGivenAgain) {
+TEST_P(StoreTest, ANumberThatAnotherServerGaveIsNotGivenAgain) {
   EXPECT_EQ(add_model(1), 1);
   ASSERT_TRUE(store_->number_after("cell-7", 4));
   ASSERT_TRUE(store_->number_after("cell-7", 3));
@@ -295,7 +315,7 @@ TEST_F(StoreTest, ANumberThatAnotherServerGaveIsNotGivenAgain) {
   EXPECT_EQ(store_->replica_view()->newest.at("cell-7"), 6);
 }
 
-TEST_F(StoreTest, ANumberThatNoServerCanHaveGivenIsNotBelieved) {
+TEST_P(StoreTest, ANumberThatNoServerCanHaveGivenIsNotBelieved) {
   for (const int claimed : {std::numeric_limits<int>::max(), kHighestTold + 1})
     EXPECT_EQ(store_->number_after("cell-7", claimed).error().code, ErrorCode::kRefused);
   const auto model = test::nominal_model(cell_, 1);
@@ -305,7 +325,7 @@ TEST_F(StoreTest, ANumberThatNoServerCanHaveGivenIsNotBelieved) {
   EXPECT_EQ(add_model(2), kHighestTold + 1);
 }
 
-TEST_F(StoreTest, WhereNoNumberIsLeftAModelIsRefusedAndNoneGetsAnotherOnesNumber) {
+TEST_F(StoreFileTest, WhereNoNumberIsLeftAModelIsRefusedAndNoneGetsAnotherOnesNumber) {
   EXPECT_EQ(add_model(1), 1);
   store_.reset();
   SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("UPDATE models SET version = 2147483647");
@@ -315,7 +335,7 @@ TEST_F(StoreTest, WhereNoNumberIsLeftAModelIsRefusedAndNoneGetsAnotherOnesNumber
   EXPECT_EQ(one_more.error().code, ErrorCode::kRefused);
 }
 
-TEST_F(StoreTest, TakesAFileOfTheFirstSchemaOn) {
+TEST_F(StoreFileTest, TakesAFileOfTheFirstSchemaOn) {
   ASSERT_TRUE(store_->add_batch(batch("lt-07"), job()));
   store_.reset();
   {
@@ -331,7 +351,7 @@ TEST_F(StoreTest, TakesAFileOfTheFirstSchemaOn) {
   EXPECT_TRUE(store_->add_diagnosis(job(), {"csv", false, "", ""}));
 }
 
-TEST_F(StoreTest, TakesOnAFileOfBeforeTimesWereKeptAndKnowsWhenItsModelsWereTrained) {
+TEST_F(StoreFileTest, TakesOnAFileOfBeforeTimesWereKeptAndKnowsWhenItsModelsWereTrained) {
   const auto id = store_->add_batch(batch("lt-07"), job())->id;
   CompensatedModel::Parts parts = test::nominal_model(cell_, 40).parts();
   parts.provenance.trained_at = 1'650'000'000;
@@ -355,7 +375,7 @@ TEST_F(StoreTest, TakesOnAFileOfBeforeTimesWereKeptAndKnowsWhenItsModelsWereTrai
   EXPECT_EQ(in_force(), 1);
 }
 
-TEST_F(StoreTest, KeepsWhenAModelWasTrainedAndTheNewestOfItsMeasurementsTaken) {
+TEST_P(StoreTest, KeepsWhenAModelWasTrainedAndTheNewestOfItsMeasurementsTaken) {
   CompensatedModel::Parts parts = test::nominal_model(cell_, 40).parts();
   parts.provenance.trained_at = 1'650'000'000;
   parts.provenance.measured_at = 1'600'000'000;
@@ -366,7 +386,7 @@ TEST_F(StoreTest, KeepsWhenAModelWasTrainedAndTheNewestOfItsMeasurementsTaken) {
   EXPECT_GT(store_->models("cell-7")->front().created_at, 1'700'000'000);
 }
 
-TEST_F(StoreTest, KeepsWhenJobsBeganAndEndedAndListsThoseThatEndedLast) {
+TEST_P(StoreTest, KeepsWhenJobsBeganAndEndedAndListsThoseThatEndedLast) {
   const auto first = store_->add_batch(batch("a"), job())->id;
   EXPECT_FALSE(store_->job(first)->started_at);
   ASSERT_TRUE(store_->set_job_running(first));
@@ -392,7 +412,7 @@ TEST_F(StoreTest, KeepsWhenJobsBeganAndEndedAndListsThoseThatEndedLast) {
   EXPECT_TRUE(numbers("cell-8", 20).empty());
 }
 
-TEST_F(StoreTest, ReleasesBatchesWithTheModelThatGoesInForceOrNotAtAll) {
+TEST_P(StoreTest, ReleasesBatchesWithTheModelThatGoesInForceOrNotAtAll) {
   ASSERT_TRUE(store_->add_batch(batch("a"), job()));
   ASSERT_TRUE(store_->set_quarantine("cell-7", "a", "another tool"));
   StoredJob wanted = job();
@@ -410,7 +430,7 @@ TEST_F(StoreTest, ReleasesBatchesWithTheModelThatGoesInForceOrNotAtAll) {
   EXPECT_EQ(store_->batch("cell-7", "a")->quarantine, "");
 }
 
-TEST_F(StoreTest, RefusesAJobOverAnUnknownBatch) {
+TEST_P(StoreTest, RefusesAJobOverAnUnknownBatch) {
   StoredJob lost = job();
   lost.batch_ids = {"never-seen"};
   const auto refused_job = store_->add_job(lost);
@@ -419,7 +439,7 @@ TEST_F(StoreTest, RefusesAJobOverAnUnknownBatch) {
   EXPECT_TRUE(store_->unfinished_jobs()->empty());
 }
 
-TEST_F(StoreTest, CountsAttemptsThatWereNotPutBack) {
+TEST_P(StoreTest, CountsAttemptsThatWereNotPutBack) {
   const auto id = store_->add_batch(batch("a"), job())->id;
   ASSERT_TRUE(store_->set_job_running(id));
   ASSERT_TRUE(store_->set_job_running(id));
@@ -429,7 +449,7 @@ TEST_F(StoreTest, CountsAttemptsThatWereNotPutBack) {
   EXPECT_EQ(store_->job(id)->state, JobState::kQueued);
 }
 
-TEST_F(StoreTest, AFinishedJobStaysFinished) {
+TEST_P(StoreTest, AFinishedJobStaysFinished) {
   const auto id = store_->add_batch(batch("a"), job())->id;
   ASSERT_TRUE(store_->set_job_failed(id, "too few rows"));
   EXPECT_EQ(store_->job(id)->message, "too few rows");
@@ -440,7 +460,7 @@ TEST_F(StoreTest, AFinishedJobStaysFinished) {
   EXPECT_EQ(store_->set_job_running(id + 1).error().code, ErrorCode::kNotFound);
 }
 
-TEST_F(StoreTest, StoresModelsAsVersionsOfTheirCell) {
+TEST_P(StoreTest, StoresModelsAsVersionsOfTheirCell) {
   const auto id = store_->add_batch(batch("a"), job())->id;
   EXPECT_EQ(add_model(10), 1);
   EXPECT_EQ(add_model(20, true, id), 2);
@@ -461,7 +481,7 @@ TEST_F(StoreTest, StoresModelsAsVersionsOfTheirCell) {
   EXPECT_EQ(serialize(*model), serialize(test::nominal_model(cell_, 20)));
 }
 
-TEST_F(StoreTest, AModelOfAFinishedJobIsNotStored) {
+TEST_P(StoreTest, AModelOfAFinishedJobIsNotStored) {
   const auto id = store_->add_batch(batch("a"), job())->id;
   ASSERT_TRUE(store_->set_job_failed(id, "interrupted"));
   const auto stored = store_->add_model("cell-7", test::nominal_model(cell_, 1), id, true, "made");
@@ -470,7 +490,7 @@ TEST_F(StoreTest, AModelOfAFinishedJobIsNotStored) {
   EXPECT_EQ(in_force(), 0);
 }
 
-TEST_F(StoreTest, RollsBackFurtherEachTimeAndNeverForth) {
+TEST_P(StoreTest, RollsBackFurtherEachTimeAndNeverForth) {
   for (int version = 1; version <= 3; ++version) add_model(version, true);
   EXPECT_EQ(store_->previous_in_force("cell-7").value(), (std::vector{2, 1}));
   EXPECT_EQ(store_->rollback("cell-7").value(), 2);
@@ -484,7 +504,7 @@ TEST_F(StoreTest, RollsBackFurtherEachTimeAndNeverForth) {
   EXPECT_EQ(in_force(), 1);
 }
 
-TEST_F(StoreTest, RollsBackSeveralStepsAtOnceAndNoFurtherThanThereAre) {
+TEST_P(StoreTest, RollsBackSeveralStepsAtOnceAndNoFurtherThanThereAre) {
   for (int version = 1; version <= 3; ++version) add_model(version, true);
   EXPECT_EQ(store_->rollback("cell-7", 3).error().code, ErrorCode::kNotFound);
   EXPECT_EQ(in_force(), 3);
@@ -493,7 +513,7 @@ TEST_F(StoreTest, RollsBackSeveralStepsAtOnceAndNoFurtherThanThereAre) {
   EXPECT_EQ(store_->rollback("cell-7").error().code, ErrorCode::kNotFound);
 }
 
-TEST_F(StoreTest, AnActivationAfterARollbackRemembersWhatItReplaced) {
+TEST_P(StoreTest, AnActivationAfterARollbackRemembersWhatItReplaced) {
   for (int version = 1; version <= 3; ++version) add_model(version, true);
   ASSERT_EQ(store_->rollback("cell-7").value(), 2);
   ASSERT_TRUE(store_->activate("cell-7", 3));
@@ -501,14 +521,14 @@ TEST_F(StoreTest, AnActivationAfterARollbackRemembersWhatItReplaced) {
   EXPECT_EQ(store_->rollback("cell-7").value(), 1);
 }
 
-TEST_F(StoreTest, ActivatingWhatIsInForceChangesNothing) {
+TEST_P(StoreTest, ActivatingWhatIsInForceChangesNothing) {
   add_model(1, true);
   add_model(2, true);
   ASSERT_TRUE(store_->activate("cell-7", 2));
   EXPECT_EQ(store_->rollback("cell-7").value(), 1);
 }
 
-TEST_F(StoreTest, RefusesToActivateAnUnknownVersion) {
+TEST_P(StoreTest, RefusesToActivateAnUnknownVersion) {
   add_model(1, true);
   EXPECT_EQ(store_->activate("cell-7", 2).error().code, ErrorCode::kNotFound);
   EXPECT_EQ(store_->activate("cell-8", 1).error().code, ErrorCode::kNotFound);
@@ -517,7 +537,7 @@ TEST_F(StoreTest, RefusesToActivateAnUnknownVersion) {
   EXPECT_EQ(store_->rollback("cell-8").error().code, ErrorCode::kNotFound);
 }
 
-TEST_F(StoreTest, WorksForSeveralThreadsAtOnce) {
+TEST_P(StoreTest, WorksForSeveralThreadsAtOnce) {
   {
     std::vector<std::jthread> threads;
     for (int t = 0; t < 4; ++t) {
@@ -533,14 +553,14 @@ TEST_F(StoreTest, WorksForSeveralThreadsAtOnce) {
   EXPECT_EQ(store_->unfinished_jobs()->size(), 40u);
 }
 
-TEST_F(StoreTest, RefusesASecondWriterAndNamesTheFirst) {
+TEST_F(StoreFileTest, RefusesASecondWriterAndNamesTheFirst) {
   const auto second = Store::open(path_);
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().code, ErrorCode::kConflict);
   EXPECT_EQ(refusal_of(second), Refusal(path_).of(ErrorCode::kConflict));
 }
 
-TEST_F(StoreTest, RefusesASecondWriterThatComesByALink) {
+TEST_F(StoreFileTest, RefusesASecondWriterThatComesByALink) {
   const std::string link = folder_.file("link.db");
   std::filesystem::create_symlink(path_, link);
   const auto second = Store::open(link);
@@ -548,7 +568,7 @@ TEST_F(StoreTest, RefusesASecondWriterThatComesByALink) {
   EXPECT_EQ(second.error().code, ErrorCode::kConflict);
 }
 
-TEST_F(StoreTest, RefusesTheDatabaseOfAnotherProgramAndLeavesItAlone) {
+TEST_F(StoreFileTest, RefusesTheDatabaseOfAnotherProgramAndLeavesItAlone) {
   const std::string other = folder_.file("other.db");
   { SQLite::Database(other, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE).exec("CREATE TABLE t (a)"); }
   const std::string before = test::read_file(other);
@@ -558,7 +578,7 @@ TEST_F(StoreTest, RefusesTheDatabaseOfAnotherProgramAndLeavesItAlone) {
   EXPECT_EQ(test::read_file(other), before);
 }
 
-TEST_F(StoreTest, RefusesANewerSchema) {
+TEST_F(StoreFileTest, RefusesANewerSchema) {
   store_.reset();
   { SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("PRAGMA user_version = 3"); }
   const auto opened = Store::open(path_);
@@ -567,7 +587,7 @@ TEST_F(StoreTest, RefusesANewerSchema) {
   EXPECT_EQ(refusal_of(opened), Refusal(path_, {}, "schema").beyond(3, 2));
 }
 
-TEST_F(StoreTest, AFileThatIsNoDatabaseIsAnErrorThatNamesIt) {
+TEST_F(StoreFileTest, AFileThatIsNoDatabaseIsAnErrorThatNamesIt) {
   const std::string text = folder_.write("notes.db", std::string(5000, 'x'));
   const auto opened = Store::open(text);
   ASSERT_FALSE(opened);
@@ -575,13 +595,13 @@ TEST_F(StoreTest, AFileThatIsNoDatabaseIsAnErrorThatNamesIt) {
   EXPECT_EQ(refusal_of(opened), Refusal(text).of(ErrorCode::kInternal));
 }
 
-TEST_F(StoreTest, AFolderThatDoesNotExistIsAnError) {
+TEST_F(StoreFileTest, AFolderThatDoesNotExistIsAnError) {
   const auto opened = Store::open(folder_.file("nowhere/trammel.db"));
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::kInternal);
 }
 
-TEST_F(StoreTest, ADamagedFileIsAnErrorThatNamesIt) {
+TEST_F(StoreFileTest, ADamagedFileIsAnErrorThatNamesIt) {
   for (int i = 0; i < 20; ++i) {
     const std::string id = std::to_string(i);
     ASSERT_TRUE(store_->add_batch(batch(id, std::string(3000, 'x'), id), job()));
@@ -602,7 +622,7 @@ TEST_F(StoreTest, ADamagedFileIsAnErrorThatNamesIt) {
   EXPECT_EQ(refusal_of(batches), Refusal(path_).of(ErrorCode::kInternal));
 }
 
-TEST_F(StoreTest, ABatchThatIsNotWhatWasAcceptedIsNotHandedOut) {
+TEST_F(StoreFileTest, ABatchThatIsNotWhatWasAcceptedIsNotHandedOut) {
   ASSERT_TRUE(store_->add_batch(batch("a"), job()));
   store_.reset();
   { SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("UPDATE batches SET csv = 'q1_deg' || char(10) || '2'"); }
@@ -612,7 +632,7 @@ TEST_F(StoreTest, ABatchThatIsNotWhatWasAcceptedIsNotHandedOut) {
   EXPECT_EQ(changed.error().code, ErrorCode::kInternal);
 }
 
-TEST_F(StoreTest, AModelWhoseContentWasChangedIsNotHandedOut) {
+TEST_F(StoreFileTest, AModelWhoseContentWasChangedIsNotHandedOut) {
   add_model(10);
   store_.reset();
   { SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("UPDATE models SET content = replace(content, '10', '11')"); }
@@ -620,7 +640,7 @@ TEST_F(StoreTest, AModelWhoseContentWasChangedIsNotHandedOut) {
   EXPECT_FALSE(store_->model("cell-7", 1));
 }
 
-TEST_F(StoreTest, LetsAnotherProcessReadWhileItIsOpen) {
+TEST_F(StoreFileTest, LetsAnotherProcessReadWhileItIsOpen) {
   ASSERT_TRUE(store_->add_batch(batch("a"), job()));
   EXPECT_TRUE(std::filesystem::exists(path_ + "-wal"));
   SQLite::Database reader(path_, SQLite::OPEN_READONLY);
@@ -644,7 +664,7 @@ TEST_F(StoreTest, LetsAnotherProcessReadWhileItIsOpen) {
   }
 }
 
-TEST_F(StoreTest, KeepsAllThatWasAcknowledgedBeforeAKill) {
+TEST_F(StoreFileTest, KeepsAllThatWasAcknowledgedBeforeAKill) {
   store_.reset();
   const CompensatedModel model = test::nominal_model(cell_, 1);
   const StoredBatch first = batch("0", std::string(20000, 'x'));

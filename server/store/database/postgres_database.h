@@ -1,0 +1,58 @@
+#pragma once
+
+#include <postgresql/libpq-fe.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+
+#include "server/store/database/database.h"
+
+namespace trammel {
+
+/// A connection to PostgreSQL. Every call has a deadline of its own: a server that is stopped and not dead answers no
+/// other timeout. Statements are unnamed and settings are those of a transaction, so that a pooler may stand between.
+class PostgresDatabase final : public Database {
+ public:
+  enum class Session { kMayBeReadOnly, kWrites };
+
+  /// Asks the hosts of the URL one after the other, in random order. Refuses (kUnreachable) if none answers,
+  /// (kRefused) if one lets nobody in, or if all that answer are read-only and `session` is to write.
+  [[nodiscard]] static Result<std::unique_ptr<PostgresDatabase>> connect(const std::string& url, Session session);
+
+  void execute(const std::string& statements) override;
+  [[nodiscard]] Rows run(const char* sql, Values values) override;
+  int change(const char* sql, Values values) override;
+  [[nodiscard]] bool has_table(const std::string& name) override;
+  [[nodiscard]] bool is_shared() const override { return true; }
+
+  /// The connection is lost, or an answer did not come in time: nothing more comes through it.
+  [[nodiscard]] bool is_lost() const { return lost_; }
+
+ private:
+  using Connection = std::unique_ptr<PGconn, void (*)(PGconn*)>;
+  using Answer = std::unique_ptr<PGresult, void (*)(PGresult*)>;
+  using Deadline = std::chrono::steady_clock::time_point;
+
+  explicit PostgresDatabase(Connection connection);
+  [[nodiscard]] static Result<std::unique_ptr<PostgresDatabase>> connect_to_one(
+      const std::vector<std::pair<std::string, std::string>>& settings, Session session);
+  static void note_warning(void* self, const PGresult* warning);
+
+  void begin(bool writes) override;
+  void commit() override;
+  void roll_back() noexcept override;
+
+  [[nodiscard]] Answer ask(const char* sql, Values values);
+  /// The last answer to what was sent.
+  [[nodiscard]] Answer answer(Deadline deadline);
+  void wait(short events, Deadline deadline);
+  [[noreturn]] void lose(const std::string& why);
+  void check_sent(int sent);
+
+  Connection connection_;
+  bool lost_ = false;
+  std::string warned_;  // SQLSTATE of the last warning
+};
+
+}  // namespace trammel

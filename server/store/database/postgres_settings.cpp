@@ -1,0 +1,77 @@
+#include "server/store/database/postgres_settings.h"
+
+#include <postgresql/libpq-fe.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+
+namespace trammel {
+namespace {
+
+/// What a connection is told where the URL says nothing else: a line that is dead is noticed.
+constexpr std::array<std::pair<const char*, const char*>, 6> kDefaults = {{{"application_name", "trammel"},
+                                                                           {"client_encoding", "UTF8"},
+                                                                           {"keepalives_idle", "2"},
+                                                                           {"keepalives_interval", "1"},
+                                                                           {"keepalives_count", "3"},
+                                                                           {"tcp_user_timeout", "3000"}}};
+
+std::vector<std::string> parts_of(const std::string& list) {
+  std::vector<std::string> parts;
+  for (std::size_t begin = 0; begin <= list.size();) {
+    const std::size_t end = std::min(list.find(',', begin), list.size());
+    parts.push_back(list.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return parts;
+}
+
+/// One port may be that of all hosts.
+std::string nth(const std::vector<std::string>& parts, std::size_t index) {
+  return parts.size() == 1 ? parts.front() : index < parts.size() ? parts[index] : "";
+}
+
+}  // namespace
+
+Result<std::vector<PostgresSettings>> settings_of(const std::string& url) {
+  char* why = nullptr;
+  const std::unique_ptr<PQconninfoOption, void (*)(PQconninfoOption*)> options(::PQconninfoParse(url.c_str(), &why),
+                                                                               &::PQconninfoFree);
+  if (why != nullptr) ::PQfreemem(why);
+  if (!options) {
+    return refused("is no URL that PostgreSQL reads")
+        .next("write postgresql://USER@HOST/DATABASE?OPTION=VALUE, and what is special in a name as %XX");
+  }
+  PostgresSettings common;
+  std::string hosts, addresses, ports;
+  for (const PQconninfoOption* option = options.get(); option->keyword != nullptr; ++option) {
+    if (option->val == nullptr) continue;
+    const std::string key = option->keyword;
+    if (key == "host") {
+      hosts = option->val;
+    } else if (key == "hostaddr") {
+      addresses = option->val;
+    } else if (key == "port") {
+      ports = option->val;
+    } else if (key != "target_session_attrs") {  // whether it can be written is looked at by us
+      common.emplace_back(key, option->val);
+    }
+  }
+  for (const auto& [key, value] : kDefaults) {
+    if (std::none_of(common.begin(), common.end(), [&, name = key](const auto& one) { return one.first == name; }))
+      common.emplace_back(key, value);
+  }
+  const auto names = parts_of(hosts), numbers = parts_of(addresses), at = parts_of(ports);
+  std::vector<PostgresSettings> each;
+  for (std::size_t i = 0; i < std::max(names.size(), numbers.size()); ++i) {
+    PostgresSettings one = common;
+    if (const auto host = nth(names, i); !host.empty()) one.emplace_back("host", host);
+    if (const auto address = nth(numbers, i); !address.empty()) one.emplace_back("hostaddr", address);
+    if (const auto port = nth(at, i); !port.empty()) one.emplace_back("port", port);
+    each.push_back(std::move(one));
+  }
+  return each;
+}
+
+}  // namespace trammel

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "server/store/connection.h"
+#include "server/store/open_database.h"
+#include "server/store/schema.h"
+#include "server/store/store_file.h"
+#include "server/store/writer_lock.h"
+
+namespace trammel {
+
+/// An SQLite file: one connection behind one lock. Where the file cannot be written it is read, or not even that; it is
+/// tried again by whoever wants to write, once a second at most. Nothing is acknowledged but what is in the file that
+/// the path leads to: a file that was removed, replaced or written by another program is read at most, until it is back
+/// as it was.
+class FileConnection final : public StoreConnection {
+ public:
+  /// Refuses what Store::open() refuses.
+  [[nodiscard]] static Result<std::unique_ptr<StoreConnection>> open(const std::string& path);
+  FileConnection(WriterLock writer, StoreFile held, std::string name, OpenedDatabase opened,
+                 std::unique_ptr<ServedCopies> kept);
+  ~FileConnection() override;
+
+  [[nodiscard]] bool is_shared() const override { return false; }
+  [[nodiscard]] Status try_again() override;
+
+ private:
+  [[nodiscard]] Status read(const Job& job) override;
+  [[nodiscard]] Status write(const Job& job) override;
+  [[nodiscard]] Status transacted(const Job& job, bool* changed) TRAMMEL_REQUIRES(mutex_);
+  /// Whether the file is as this process left it, and can be written as far as is known.
+  [[nodiscard]] bool is_in_order();
+  /// Opens a file again that could not be written when it was opened, or that is not as it was left.
+  [[nodiscard]] Status be_sure_of_file() TRAMMEL_REQUIRES(mutex_);
+  [[nodiscard]] Status open_anew() TRAMMEL_REQUIRES(mutex_);
+  [[nodiscard]] Status opened_anew() TRAMMEL_REQUIRES(mutex_);
+  /// Whether what is at the path now is the store as it was left. Closes the database if that was written by others.
+  [[nodiscard]] Status check_as_left() TRAMMEL_REQUIRES(mutex_);
+  /// Whether what was just committed is in the file that the path leads to.
+  [[nodiscard]] Status check_in_place() TRAMMEL_REQUIRES(mutex_);
+  /// The journal of a file that is no longer at the path would be taken for that of the next one there.
+  void leave_no_journal() TRAMMEL_REQUIRES(mutex_);
+  void note_opened() TRAMMEL_REQUIRES(mutex_);
+
+  const WriterLock lock_;
+  Mutex mutex_;
+  StoreFile file_ TRAMMEL_GUARDED_BY(mutex_);                            // let go of after the database is closed
+  std::unique_ptr<SqliteDatabase> database_ TRAMMEL_GUARDED_BY(mutex_);  // null: cannot be read
+  bool must_be_opened_anew_ TRAMMEL_GUARDED_BY(mutex_) = false;
+  bool was_written_ TRAMMEL_GUARDED_BY(mutex_) = false;            // by this process: no other state is taken again
+  std::optional<StoreMark> mark_ TRAMMEL_GUARDED_BY(mutex_) = {};  // of that state; empty: it could not be read
+  std::chrono::steady_clock::time_point tried_last_ TRAMMEL_GUARDED_BY(mutex_) = {};
+};
+
+}  // namespace trammel

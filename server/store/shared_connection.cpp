@@ -1,0 +1,186 @@
+#include "server/store/shared_connection.h"
+
+#include <algorithm>
+#include <random>
+#include <thread>
+#include <utility>
+
+#include "server/store/schema.h"
+#include "server/store/shared_schema.h"
+#include "server/store/store_place.h"
+
+namespace trammel {
+namespace {
+
+constexpr std::size_t kMostConnections = 4;
+constexpr std::chrono::seconds kPatience{6};  // for a connection that others use, and for rows that others lock
+constexpr int kMostTries = 5;
+
+/// Longer each time, and not the same for all who were in each other's way.
+void pause(int tries) {
+  thread_local std::mt19937 random(std::random_device{}());
+  std::this_thread::sleep_for(std::chrono::milliseconds(std::uniform_int_distribution<int>(1, 20 * tries)(random)));
+}
+
+}  // namespace
+
+SharedConnection::SharedConnection(std::string url, std::unique_ptr<ServedCopies> kept)
+    : StoreConnection(spoken_place(url), std::move(kept)), url_(std::move(url)) {}
+
+Result<std::unique_ptr<StoreConnection>> SharedConnection::open(const std::string& url, const std::string& cache) {
+  std::unique_ptr<SharedConnection> made(new SharedConnection(url, std::make_unique<ServedCopies>(cache)));
+  auto connected = PostgresDatabase::connect(url, PostgresDatabase::Session::kWrites);
+  const auto stores = made->copies->stores();
+  if (connected) {
+    if (const Status ours = made->admit(**connected); !ours) return tl::make_unexpected(ours.error());
+    made->give_back(std::move(*connected));
+  } else {
+    Failure why = Failure(connected.error()).in(made->path);
+    if (why.value().code != ErrorCode::kUnreachable && stores.empty()) return why;
+    if (!stores.empty()) static_cast<void>(made->copies->belong_to(stores.front(), false));
+    made->note_trouble(std::move(why).as(ErrorCode::kBusy).value(), true);
+  }
+  return made;
+}
+
+Status SharedConnection::admit(Database& database) {
+  try {
+    if (const Status ours = check_shared_schema(database, path); !ours) return ours;
+    const std::string id = text_of(database, "SELECT id FROM store_identity WHERE id <> ''");
+    const auto known = copies->stores();
+    if (!known.empty() && std::find(known.begin(), known.end(), id) == known.end())
+      return failure(ErrorCode::kInternal, "another store than the one that served here, whose copies are in {}",
+                     copies->root())
+          .in(path)
+          .next("name the right one, or move the copies away if it is meant to be another");
+    const MutexLock guard(mutex_);
+    if (!identity_.empty() && identity_ != id)
+      return failure(ErrorCode::kInternal, "was replaced by another store while it is served from")
+          .in(path)
+          .next("put the right one back, or start the service again");
+    if (identity_.empty()) static_cast<void>(copies->belong_to(id, true));
+    identity_ = id;
+    return {};
+  } catch (const DatabaseError& error) {
+    return failure_of(error, path);
+  }
+}
+
+Result<SharedConnection::Connected> SharedConnection::connect() {
+  auto connected = PostgresDatabase::connect(url_, PostgresDatabase::Session::kWrites);
+  if (!connected) return Failure(connected.error()).in(path);
+  if (const Status ours = admit(**connected); !ours) return tl::make_unexpected(ours.error());
+  return connected;
+}
+
+Result<SharedConnection::Connected> SharedConnection::borrow() {
+  {
+    MutexLock guard(mutex_);
+    const bool free = given_back_.wait_until(guard, Clock::now() + kPatience,
+                                             [this]() TRAMMEL_REQUIRES(mutex_) { return lent_ < kMostConnections; });
+    if (!free) return failure(ErrorCode::kBusy, "all {} connections are in use", lent_).in(path).next("ask again");
+    ++lent_;
+    if (!idle_.empty()) {
+      Connected connected = std::move(idle_.back());
+      idle_.pop_back();
+      return connected;
+    }
+  }
+  auto connected = connect();
+  if (!connected) give_back(nullptr);
+  return connected;
+}
+
+void SharedConnection::give_back(Connected connected) {
+  {
+    const MutexLock guard(mutex_);
+    if (lent_ > 0) --lent_;
+    if (connected && connected->is_lost()) idle_.clear();  // what killed one has killed all
+    if (connected && !connected->is_lost()) idle_.push_back(std::move(connected));
+  }
+  given_back_.notify_one();
+}
+
+Status SharedConnection::read(const Job& job) {
+  if (const StoreState now = state(); !now.readable) return tl::make_unexpected(*now.why_not_written);
+  return run(job, Transaction::For::kReading);
+}
+
+Status SharedConnection::write(const Job& job) {
+  if (const auto why = state().why_not_written) return tl::make_unexpected(*why);
+  return run(job, Transaction::For::kWriting);
+}
+
+Status SharedConnection::run(const Job& job, Transaction::For what) {
+  const auto until = Clock::now() + kPatience;
+  for (int tries = 1;; ++tries) {
+    auto connected = borrow();
+    if (!connected) {
+      const Error why = Failure(connected.error()).as(ErrorCode::kBusy).value();
+      if (connected.error().code != ErrorCode::kBusy) note_trouble(why, true);
+      return tl::make_unexpected(why);
+    }
+    Status result;
+    std::optional<DatabaseError> failed;
+    try {
+      Transaction transaction(**connected, what);
+      result = job(**connected);
+      if (result) transaction.commit();
+    } catch (const DatabaseError& error) {
+      failed = error;
+    } catch (const std::exception& error) {
+      result = failure(ErrorCode::kInternal, "{}", error.what()).in(path);
+    }
+    const bool lost = (*connected)->is_lost();
+    give_back(std::move(*connected));
+    if (!failed) {
+      if (result && what == Transaction::For::kWriting) note_written();
+      return result;
+    }
+    const bool were_in_the_way =
+        failed->kind() == DatabaseError::Kind::kAgain && tries < kMostTries && Clock::now() < until;
+    const bool was_lost_before = failed->kind() == DatabaseError::Kind::kAway && lost && tries == 1;
+    if (!were_in_the_way && !was_lost_before) return told(*failed, lost);
+    pause(tries);
+  }
+}
+
+Status SharedConnection::told(const DatabaseError& error, bool lost) {
+  Failure said = failure_of(error, path);
+  if (error.kind() == DatabaseError::Kind::kAway) note_trouble(said.value(), lost);
+  if (error.kind() == DatabaseError::Kind::kAgain) {
+    if (const std::string who = who_holds(); !who.empty()) said.value().message += "; " + who;
+  }
+  return said;
+}
+
+std::string SharedConnection::who_holds() {
+  auto connected = borrow();
+  if (!connected) return "";
+  std::string who;
+  try {
+    Rows row = prepare(**connected,
+                       "SELECT a.application_name, a.usename, a.pid FROM pg_locks AS l "
+                       "JOIN pg_stat_activity AS a ON a.pid = l.pid JOIN pg_class AS c ON c.oid = l.relation "
+                       "WHERE l.granted AND l.mode NOT IN ('AccessShareLock') AND a.pid <> pg_backend_pid() "
+                       "AND c.relname IN ('cells', 'jobs', 'batches', 'audit_end') "
+                       "AND COALESCE(a.application_name, '') <> 'trammel' ORDER BY a.pid LIMIT 1");
+    if (row.next())
+      who = fmt::format("{} of role {} (process {}) holds rows locked", row.text(0), row.text(1), row.integer(2));
+  } catch (const DatabaseError&) {  // nobody can say
+  }
+  give_back(std::move(*connected));
+  return who;
+}
+
+Status SharedConnection::try_again() {
+  if (!state().why_not_written) return {};
+  return run(
+      [](Database& database) -> Status {
+        change(database, "UPDATE store_identity SET id = id");
+        return {};
+      },
+      Transaction::For::kWriting);
+}
+
+}  // namespace trammel

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/store/connection.h"
+#include "server/store/database/postgres_database.h"
+
+namespace trammel {
+
+/// A database that several servers share. While it is away everything is refused at once; it is tried again by
+/// try_again() alone. What is served meanwhile are the copies.
+class SharedConnection final : public StoreConnection {
+ public:
+  /// A database that does not answer is away. Refuses what Store::open() refuses.
+  [[nodiscard]] static Result<std::unique_ptr<StoreConnection>> open(const std::string& url, const std::string& cache);
+
+  [[nodiscard]] bool is_shared() const override { return true; }
+  [[nodiscard]] Status try_again() override;
+
+ private:
+  using Connected = std::unique_ptr<PostgresDatabase>;
+  using Clock = std::chrono::steady_clock;
+
+  SharedConnection(std::string url, std::unique_ptr<ServedCopies> kept);
+  [[nodiscard]] Status read(const Job& job) override;
+  [[nodiscard]] Status write(const Job& job) override;
+  /// In one transaction, again where others were in the way.
+  [[nodiscard]] Status run(const Job& job, Transaction::For what);
+  [[nodiscard]] Status told(const DatabaseError& error, bool lost);
+
+  /// Whether it is the store that served here before, of a schema that this program knows.
+  [[nodiscard]] Status admit(Database& database);
+  [[nodiscard]] Result<Connected> connect();
+  /// One that nobody uses, or a new one.
+  [[nodiscard]] Result<Connected> borrow();
+  void give_back(Connected connected);
+  /// Who else holds rows locked, for people; empty: not known.
+  [[nodiscard]] std::string who_holds();
+
+  const std::string url_;  // may hold a password
+  Mutex mutex_;
+  Condition given_back_;
+  std::string identity_ TRAMMEL_GUARDED_BY(mutex_);  // of the store; empty: not known yet
+  std::vector<Connected> idle_ TRAMMEL_GUARDED_BY(mutex_);
+  std::size_t lent_ TRAMMEL_GUARDED_BY(mutex_) = 0;
+};
+
+}  // namespace trammel

@@ -1,0 +1,112 @@
+#include "server/store/shared_schema.h"
+
+#include <array>
+
+#include "server/store/audit_rows.h"
+#include "server/store/schema.h"
+#include "server/store/schema_text.h"
+#include "server/store/statements.h"
+
+namespace trammel {
+namespace {
+
+/// A step from the schema before it to the next one; the first makes all tables. A step that was released stays as it
+/// is.
+struct Migration {
+  std::string statements;
+  int works_from;  ///< the oldest schema whose programs work on this one, too
+};
+
+const std::array<Migration, 1>& migrations() {
+  static const std::array<Migration, 1> all = {
+      {{in_postgres(std::string(kSchema) + kSchemaAdded + kTablesBeside + kAuditTables) +
+            "CREATE TABLE trammel_schema (version BIGINT NOT NULL, works_from BIGINT NOT NULL);"
+            "INSERT INTO trammel_schema (version, works_from) VALUES (0, 0);"
+            "INSERT INTO store_identity (id) VALUES (replace(CAST(gen_random_uuid() AS TEXT), '-', ''));",
+        1}}};
+  return all;
+}
+
+std::int64_t newest() { return static_cast<std::int64_t>(migrations().size()); }
+
+bool is_empty(Database& database) {
+  return integer_of(database,
+                    "SELECT COUNT(*) FROM pg_catalog.pg_class WHERE relkind IN ('r', 'v', 'p') "
+                    "AND relnamespace = to_regnamespace(current_schema())") == 0;
+}
+
+struct Schema {
+  std::int64_t version = 0;
+  std::int64_t works_from = 0;
+};
+
+/// 0: the database is empty.
+Result<Schema> schema_of(Database& database, const std::string& place) {
+  if (!database.has_table("trammel_schema")) {
+    if (is_empty(database)) return Schema{};
+    return refused("a database of another program").in(place).next("name a database of its own");
+  }
+  Rows row = prepare(database, "SELECT version, works_from FROM trammel_schema");
+  if (!row.next()) return refused("its schema has no number").in(place);
+  const Schema schema{row.integer64(0), row.integer64(1)};
+  if (schema.works_from <= newest()) return schema;
+  return refused("schema {} is newer than this program's, limit {}", schema.version, newest())
+      .in(place)
+      .of(kSchemaField)
+      .beyond(schema.version, newest())
+      .next("start a newer one");
+}
+
+}  // namespace
+
+Status check_shared_schema(Database& database, const std::string& place) {
+  const auto schema = schema_of(database, place);
+  if (!schema) return tl::make_unexpected(schema.error());
+  const std::string init = fmt::format("run trammel store init '{}' as the role that is to own it", place);
+  if (schema->version == 0) return refused("the database is empty").in(place).of(kSchemaField).next(init);
+  if (schema->version >= newest()) return {};
+  return refused("schema {} is older than this program's, {}", schema->version, newest())
+      .in(place)
+      .of(kSchemaField)
+      .beyond(schema->version, newest())
+      .next(init);
+}
+
+Status migrate_shared_schema(Database& database, const std::string& place) {
+  Transaction transaction(database, Transaction::For::kWriting);
+  constexpr std::int64_t kOneAtATime = 0x5452414D;  // "TRAM"
+  static_cast<void>(prepare(database, "SELECT pg_advisory_xact_lock($1)", kOneAtATime));
+  const auto schema = schema_of(database, place);
+  if (!schema) return tl::make_unexpected(schema.error());
+  for (std::int64_t version = schema->version; version < newest(); ++version) {
+    const Migration& step = migrations()[static_cast<std::size_t>(version)];
+    database.execute(step.statements);
+    change(database, "UPDATE trammel_schema SET version = $1, works_from = $2", version + 1, step.works_from);
+  }
+  if (schema->version < newest())
+    record_audit(database, {"", schema->version == 0 ? "store" : "migrate", "store",
+                            schema->version == 0 ? "" : fmt::format("schema {}", schema->version),
+                            fmt::format("schema {}", newest())});
+  transaction.commit();
+  return {};
+}
+
+Status grant_shared_store(Database& database, const std::string& role) {
+  if (text_of(database, "SELECT current_user") == role)
+    return refused("role {} owns the store, and could change its audit trail", role).next("grant it to another role");
+  Rows quoted = prepare(database, "SELECT quote_ident($1), quote_ident(current_schema())", role);
+  if (!quoted.next()) return {};
+  const std::string to = quoted.text(0), in = quoted.text(1);
+  Transaction transaction(database, Transaction::For::kWriting);
+  database.execute(
+      fmt::format("GRANT USAGE ON SCHEMA {1} TO {0};"
+                  "GRANT SELECT, INSERT, UPDATE, DELETE ON ALL TABLES IN SCHEMA {1} TO {0};"
+                  "REVOKE UPDATE, DELETE, TRUNCATE ON audit FROM {0};"
+                  "REVOKE INSERT, DELETE, TRUNCATE ON audit_end FROM {0};"
+                  "REVOKE INSERT, UPDATE, DELETE, TRUNCATE ON trammel_schema FROM {0}",
+                  to, in));
+  transaction.commit();
+  return {};
+}
+
+}  // namespace trammel

@@ -1,0 +1,118 @@
+#include "tests/support/postgres.h"
+
+#include <fmt/format.h>
+#include <pwd.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <vector>
+
+#include "server/store/store_init.h"
+
+namespace trammel::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::chrono::seconds kPatience{60};
+
+[[noreturn]] void give_up(const std::string& why) {
+  fmt::print(stderr, "PostgreSQL for the tests: {}\n", why);
+  std::abort();
+}
+
+/// The newest one that is installed.
+std::string program(const std::string& name) {
+  std::string newest;
+  std::error_code error;
+  for (const auto& version : fs::directory_iterator("/usr/lib/postgresql", error))
+    newest = std::max(newest, (version.path() / "bin").string());
+  if (newest.empty()) give_up("is not installed (deploy/dependencies)");
+  return newest + "/" + name;
+}
+
+/// It refuses to run as root.
+std::vector<std::string> as_its_user(std::vector<std::string> command) {
+  if (::geteuid() != 0) return command;
+  std::vector<std::string> whole = {"/usr/bin/setpriv", "--reuid=postgres", "--regid=postgres", "--init-groups",
+                                    "--pdeathsig=QUIT"};
+  whole.insert(whole.end(), command.begin(), command.end());
+  return whole;
+}
+
+void give_to_its_user(const fs::path& folder) {
+  if (::geteuid() != 0) return;
+  const passwd* user = ::getpwnam("postgres");
+  if (user == nullptr || ::chown(folder.c_str(), user->pw_uid, user->pw_gid) != 0) give_up("has no user");
+}
+
+}  // namespace
+
+Postgres& Postgres::of_program() {
+  static Postgres one;
+  return one;
+}
+
+Postgres::Postgres() {
+  give_to_its_user(folder_.path());
+  const Finished made = run(as_its_user({program("initdb"), "-D", data(), "-U", "postgres", "-A", "trust", "-E", "UTF8",
+                                         "--locale=C.UTF-8", "--no-sync"}),
+                            kPatience);
+  if (made.exit_code != 0) give_up(made.err);
+  start();
+  sql(url("postgres"), "CREATE DATABASE template_store");
+  if (const Status ready = init_store(url("template_store")); !ready) give_up(sentence(ready.error()));
+}
+
+Postgres::~Postgres() { stop(); }
+
+void Postgres::start() {
+  server_.emplace(as_its_user({program("postgres"), "-D", data(), "-k", folder_.path().string(), "-c",
+                               "listen_addresses=", "-c", "fsync=off", "-c", "max_connections=60"}));
+  if (!server_->wait_for_line("ready to accept connections", kPatience)) give_up(server_->standard_error());
+}
+
+void Postgres::stop() {
+  if (!server_) return;
+  server_->signal(SIGQUIT);
+  static_cast<void>(server_->wait(kPatience));
+  server_.reset();
+}
+
+void Postgres::freeze(bool frozen) const {
+  const int number = frozen ? SIGSTOP : SIGCONT;
+  std::ifstream children(fmt::format("/proc/{0}/task/{0}/children", server_->pid()));
+  if (frozen) server_->signal(number);
+  for (pid_t child = 0; children >> child;) ::kill(child, number);
+  if (!frozen) server_->signal(number);
+}
+
+std::string Postgres::url(const std::string& database, const std::string& role) const {
+  return fmt::format("postgresql://{}@/{}?host={}", role, database, folder_.path().string());
+}
+
+std::string Postgres::sql(const std::string& url, const std::string& statement) const {
+  const Finished said = run({program("psql"), url, "-v", "ON_ERROR_STOP=1", "-qAtc", statement}, kPatience);
+  if (said.exit_code != 0) give_up(said.err);
+  return said.out;
+}
+
+std::string Postgres::new_database() {
+  const std::string name = fmt::format("test_{}", ++databases_);
+  sql(url("postgres"), "CREATE DATABASE " + name);
+  return url(name);
+}
+
+std::string Postgres::new_store() {
+  const std::string name = fmt::format("test_{}", ++databases_);
+  sql(url("postgres"), fmt::format("CREATE DATABASE {} TEMPLATE template_store", name));
+  // A store of its own, and no copy of the template.
+  sql(url(name), "UPDATE store_identity SET id = md5(random()::text)");
+  return url(name);
+}
+
+}  // namespace trammel::test
