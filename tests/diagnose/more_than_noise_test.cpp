@@ -109,7 +109,7 @@ Diagnosis with_loaded_play(bool both_sides) {
     m.context.direction.assign(6, side);
     ArmState arm = robot.truth.state(m.context);
     const Pose still = ArmKinematics(arm).tool_pose_W();
-    arm.add_to_joint(2, -side * (5e-5 + 3e-9 * std::abs(ArmKinematics(arm).gravity_torque()(2))));
+    arm.add_to_joint(2, -side * (5e-5 + 1e-6 * std::abs(ArmKinematics(arm).gravity_torque()(2))));
     const Pose moved = ArmKinematics(arm).tool_pose_W() * still.inverse();
     m.p_W = moved * m.p_W;
     m.R_WT = moved.linear() * *m.R_WT;
