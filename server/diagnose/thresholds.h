@@ -102,7 +102,12 @@ inline constexpr double kPathStep = 0.2;
 
 // Doubting: what makes a finding unsure once everything was found.
 
-/// Share of the range of all other poses by which a pose must lie beyond them in a joint to stand at the edge.
+/// Numbers of a cause of one joint above which it fits a part of many other causes.
+inline constexpr int kManyNumbers = 12;
+/// Times what is unexplained (rms): a pose that is out by less may be where that is largest.
+inline constexpr double kFarOut = 10;
+/// Share of the range of all other poses by which a pose must lie beyond them to stand at the edge: in the angle of a
+/// gear, in the torque on it, or in its reach.
 inline constexpr double kBeyondOthers = 0.05;
 /// Share of the size of what is unknown: an effect that is smaller may be part of it.
 inline constexpr double kDwarfed = 0.25;

@@ -58,5 +58,30 @@ TEST(SlowChange, AZeroThatCreepsByMilliradiansIsMoreThanThat) {
   EXPECT_EQ(large.sentence.find("as parts do that warm up"), std::string::npos) << large.sentence;
 }
 
+/// cell-7's virtual robot, whose tool creeps by up to `size`, m, there and back.
+Diagnosis with_creeping_tool(double size, std::uint64_t seed) {
+  const auto cell = test::cell_7();
+  const VirtualRobot robot = test::chapter_5_robot(cell);
+  MeasurementBatch batch = test::measured(robot, 80, seed);
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
+    Measurement& m = batch.measurements[i];
+    m.context.time = 30.0 * static_cast<double>(i);
+    const double gone = size * std::sin(3.1 * static_cast<double>(i) / static_cast<double>(batch.measurements.size()));
+    m.p_W += robot.truth.pose_W(m.context).linear() * Vector3(gone, 0, 0);
+  }
+  DiagnoseOptions options;
+  options.draws = 200;
+  options.recovery = false;
+  options.next_poses = 0;
+  return test::demand(diagnose(cell, batch, options));
+}
+
+TEST(SlowChange, AToolThatCreepsByMillimetresIsNoWarmingUpAndByATenthItMayBe) {
+  const Diagnosis large = with_creeping_tool(4e-3, 5);
+  EXPECT_EQ(large.sentence.find("as parts do that warm up"), std::string::npos) << large.sentence;
+  const Diagnosis small = with_creeping_tool(1.5e-4, 5);
+  EXPECT_NE(small.sentence.find("as parts do that warm up"), std::string::npos) << small.sentence;
+}
+
 }  // namespace
 }  // namespace trammel::cause_search

@@ -250,6 +250,7 @@ std::vector<FamilyPtr> make_families(const LinearProblem& problem) {
     for_each_cause(robot, [&](const CauseRecord& record, int joint) { families.add_slow(record, joint); });
     families.add(make_slow_family(problem, size_of_arm(problem), "the size of the arm", -1));
   }
+  families.add(make_attitude_family(problem));
   families.add(make_anonymous_family(problem, {}));
   for (int joint = 0; joint < robot.size(); ++joint) {
     families.add(make_anonymous_family(problem, {joint}));

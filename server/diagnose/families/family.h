@@ -98,6 +98,12 @@ using FamilyPtr = std::unique_ptr<Family>;
 /// empty, of the order in time.
 [[nodiscard]] FamilyPtr make_anonymous_family(const LinearProblem& problem, const std::vector<int>& joints);
 
+/// What an error that follows the attitude of the tool depends on.
+inline constexpr const char* kAttitude = "attitude of the tool to gravity";
+/// A displacement of the tool that follows how it stands to gravity, as where it sags in its clamp. No cause of the
+/// list does so, and causes of many numbers fit a part of it.
+[[nodiscard]] FamilyPtr make_attitude_family(const LinearProblem& problem);
+
 /// Something that moves slowly in the course of the batch, and may come back: a smooth function of the time for every
 /// column of `columns` (R x m, whitened, per prior). It is the rival of what moves at once, or steadily. `wanderer`:
 /// what that is, for people. `joint`: 0-based; -1: of no single one. Null where no time goes by.

@@ -60,7 +60,7 @@ const Shares& shares_of(const LinearProblem& problem, const View& view, const st
 
 namespace {
 
-class FixedFamily final : public Family {
+class FixedFamily : public Family {
  public:
   FixedFamily(Cause cause, std::string source, MatrixXd columns, double surprise)
       : cause_(std::move(cause)), source_(std::move(source)), columns_(std::move(columns)), surprise_(surprise) {}
@@ -100,7 +100,36 @@ class FixedFamily final : public Family {
   double surprise_;
 };
 
+constexpr double kTypicalSag = 1e-3;  // m
+
+class AttitudeFamily final : public FixedFamily {
+ public:
+  explicit AttitudeFamily(MatrixXd columns) : FixedFamily(unknown_cause(), "", std::move(columns), 0) {}
+  bool named() const override { return false; }
+  std::vector<std::string> depends_on() const override { return {kAttitude}; }
+};
+
+/// How far the tool moves along each of its axes where gravity has a part along each of them: nine columns.
+MatrixXd sags(const LinearProblem& problem) {
+  const PhysicalModel& model = problem.model();
+  MatrixXd columns = MatrixXd::Zero(problem.rows(), 9);
+  for (Index i = 0; i < problem.poses(); ++i) {
+    const Matrix3 R_WT = model.pose_W(problem.batch().measurements[static_cast<std::size_t>(i)].context).linear();
+    const Vector3 down_T = R_WT.transpose() * model.cell->gravity_W.normalized();
+    const Index row = problem.first_row(i);
+    for (Index k = 0; k < 3; ++k)
+      columns.block<3, 3>(row, 3 * k) =
+          kTypicalSag * down_T(k) * (problem.weight().segment<3>(row).asDiagonal() * R_WT);
+  }
+  return columns;
+}
+
 }  // namespace
+
+FamilyPtr make_attitude_family(const LinearProblem& problem) {
+  if (!(problem.model().cell->gravity_W.norm() > 0)) return nullptr;
+  return std::make_unique<AttitudeFamily>(sags(problem));
+}
 
 FamilyPtr make_fixed_family(const LinearProblem&, const Effect& effect, Cause cause, const std::vector<Index>& chosen,
                             double surprise) {

@@ -71,6 +71,10 @@ Unexplained unexplained_of(const SearchResult& found, const LinearProblem& probl
   }
   for (const WrongSign& one : found.wrong_signs)
     unexplained.hint += (unexplained.hint.empty() ? "" : "; ") + what_wrong_sign_means(one);
+  const auto& on = unexplained.depends_on;
+  if (std::find(on.begin(), on.end(), kAttitude) != on.end())
+    unexplained.hint += std::string(unexplained.hint.empty() ? "" : "; ") +
+                        "the tool moves by how it stands to gravity: see whether it sags in its clamp or mount";
   const std::string slow = what_moves(found, problem, all, unrecorded);
   unexplained.hint += (unexplained.hint.empty() || slow.empty() ? "" : ". ") + slow;
   const Index P = problem.nuisance().cols();

@@ -42,6 +42,16 @@ std::vector<Cause> descriptions_of_many(const Cause& cause, const std::vector<Ca
   return all;
 }
 
+/// Whether more is left than is stated, and not so much that it is unknown: a name may be a part of that.
+bool is_a_little_more(const Beside& beside) { return beside.larger && !beside.more_than_noise; }
+
+/// Whether a cause of one joint has so many numbers that it fits a part of much else.
+bool is_flexible(const Cause& cause, const Evidence& evidence) {
+  const CauseRecord& record = record_of(cause);
+  return record.scope == causes::Scope::kJoint && record.search == causes::SearchFamily::kColumns &&
+         evidence.numbers > thresholds::kManyNumbers;
+}
+
 bool begins(const Cause& cause) {
   return !cause.pose_id.empty() && record_of(cause).lasting == causes::Lasting::kFromAPose;
 }
@@ -128,7 +138,8 @@ namespace {
 
 /// The reasons for which a cause is doubted.
 struct Doubts {
-  bool by_surrogate, dwarfed, again, unlikely, slow, by_scale, not_held_out, by_half, at_one_point;
+  bool by_surrogate, dwarfed, again, unlikely, slow, by_scale, not_held_out, by_half, is_part, by_many_numbers,
+      at_one_point;
   std::vector<Cause> many;
 
   Doubts(const Cause& cause, const Evidence& evidence, const std::vector<Cause>& rivals, const Beside& beside)
@@ -140,6 +151,8 @@ struct Doubts {
         by_scale(may_be_scale(cause, beside)),
         not_held_out(!evidence.helps_held_out),
         by_half(beside.more_than_noise && !evidence.in_both_halves),
+        is_part(is_a_little_more(beside) && evidence.effect_rms <= beside.left),
+        by_many_numbers(is_a_little_more(beside) && is_flexible(cause, evidence)),
         at_one_point(record_of(cause).part == causes::Part::kLinks && is_each_tool_at_one_place(beside.recorded)),
         many(descriptions_of_many(cause, beside.found)) {
     std::erase_if(many, [&](const Cause& general) { return contains(rivals, general); });
@@ -159,7 +172,7 @@ std::vector<Cause> Doubts::could_also_be(const Cause& cause, const std::vector<C
   all.insert(all.end(), many.begin(), many.end());
   if (again || slow) add(all, unknown_cause(cause.joint));
   if (unlikely) add_what_weighs(all);
-  if (not_held_out || by_half) add(all, unknown_cause(cause.joint));
+  if (not_held_out || by_half || is_part || by_many_numbers) add(all, unknown_cause(cause.joint));
   return all;
 }
 
@@ -182,6 +195,10 @@ std::string Doubts::action(const Cause& cause, const Surrogates& surrogates) con
   if (by_half)
     return "measure again with other poses: half of these do not show it by themselves, and more than noise is left";
   if (not_held_out) return "measure again with other poses: those that are held out are not predicted better with it";
+  if (is_part) return "find first what is unknown here: more is left beyond the stated noise than this";
+  if (by_many_numbers)
+    return "measure more poses: a cause of so many numbers fits a part of many others, and what is left is larger than "
+           "the stated noise";
   return by_surrogate ? what_to_record(cause, surrogates) : "";
 }
 

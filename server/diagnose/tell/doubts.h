@@ -16,6 +16,7 @@ struct Beside {
   const MeasurementBatch& recorded;  ///< without the surrogates
   bool more_than_noise = false;      ///< is left by all that was found, or by what has no name
   double left = 0;                   ///< m: how much that is
+  bool larger = false;               ///< what is left is larger than stated, and not by chance
 };
 
 /// What speaks for a finding.
@@ -24,6 +25,7 @@ struct Evidence {
   bool in_both_halves = true;  ///< either half of the poses shows it by itself
   bool helps_held_out = true;  ///< poses held out are predicted better with it
   bool unlikely = false;       ///< it is larger than robots have it
+  int numbers = 1;             ///< that it has
 };
 
 /// How sure the name of a finding is, and what people do about it.

@@ -13,6 +13,7 @@
 #include "server/diagnose/tell/wording.h"
 #include "server/diagnose/thresholds.h"
 #include "server/numerics/product.h"
+#include "server/robot/arm_state.h"
 
 namespace trammel::cause_search {
 
@@ -133,6 +134,16 @@ std::vector<Index> all_but(Index count, const std::vector<Index>& left_out) {
   return kept;
 }
 
+/// In what a pose may lie at the edge of all: the angles of the gears, the torques on them, how far the arm reaches.
+VectorXd posture_of(const PhysicalModel& model, const PoseContext& context) {
+  const ArmState state = model.state(context);
+  const JointVector gears = model.cell->robot.gear_angles(context.q);
+  const VectorXd torques = ArmKinematics(state).gravity_torque();
+  VectorXd posture(gears.size() + torques.size() + 1);
+  posture << gears, torques, (model.X_WB.inverse() * ArmKinematics(state).tool_pose_W()).translation().norm();
+  return posture;
+}
+
 /// A search's findings, measured beside each other.
 class Findings {
  public:
@@ -144,6 +155,8 @@ class Findings {
  private:
   [[nodiscard]] Finding outlier(const Accepted& one) const;
   [[nodiscard]] bool is_beyond_others(const Accepted& one) const;
+  /// Whether the pose may be where something is large that the simulation lacks.
+  [[nodiscard]] bool may_show_what_lacks(const Accepted& one) const;
   [[nodiscard]] Finding cause(const Accepted& one) const;
   /// As it is told: by one number only where that is alone.
   [[nodiscard]] Cause named(const Accepted& one) const;
@@ -167,7 +180,8 @@ class Findings {
   Estimated estimated_;
   Folds folds_;
   VectorXd held_out_;
-  std::vector<FamilyPtr> families_;  // none where nothing begins at a pose
+  std::vector<FamilyPtr> families_;     // none where nothing begins at a pose
+  bool several_beyond_others_ = false;  // poses that are out stand beyond all others
 };
 
 std::vector<Cause> causes_of(const std::vector<Accepted>& accepted) {
@@ -190,22 +204,24 @@ Findings::Findings(const SearchResult& found, const LinearProblem& problem, cons
       surrogates_(surrogates),
       causes_(causes_of(found.accepted)),
       limit_(found.chance.limit),
-      beside_{causes_, unexplained, surrogates, recorded, remainder.more_than_noise, remainder.rms},
+      beside_{causes_, unexplained, surrogates, recorded, remainder.more_than_noise, remainder.rms, remainder.larger},
       columns_(background_columns(problem, found.unnamed)),
       estimated_(estimated_beside(columns_, problem.residual())),
       folds_(problem, columns_),
       held_out_(folds_.held_out_residual(problem.residual())) {
   if (std::any_of(found.accepted.begin(), found.accepted.end(), begins)) families_ = make_families(problem);
+  several_beyond_others_ = std::count_if(found.accepted.begin(), found.accepted.end(), [this](const Accepted& one) {
+                             return one.is_outlier() && is_beyond_others(one);
+                           }) > 1;
 }
 
 Finding Findings::outlier(const Accepted& one) const {
   const ErrorFigures held_out = figures_of(problem_.positions(held_out_));
   std::vector<Cause> could_also_be;
-  if (beside_.more_than_noise && is_beyond_others(one)) could_also_be.push_back(unknown_cause());
-  std::string action =
-      could_also_be.empty()
-          ? action_for(one.cause, {})
-          : "measure it again, and more poses near it: what the simulation lacks is largest at the edge";
+  if (may_show_what_lacks(one)) could_also_be.push_back(unknown_cause());
+  std::string action = could_also_be.empty()
+                           ? action_for(one.cause, {})
+                           : "measure it again, and more poses near it: what the simulation lacks may be largest there";
   return {.cause = one.cause,
           .parameters = {{"distance", "mm", to_mm(one.pose.distance), to_mm(kExpanded * problem_.noise())}},
           .effect_rms = one.pose.distance,
@@ -217,19 +233,26 @@ Finding Findings::outlier(const Accepted& one) const {
           .action = std::move(action)};
 }
 
-/// Whether the pose lies beyond all others in some joint, where nothing says what the arm does.
+bool Findings::may_show_what_lacks(const Accepted& one) const {
+  if (is_beyond_others(one)) return beside_.more_than_noise || several_beyond_others_;
+  return beside_.more_than_noise && one.pose.distance < thresholds::kFarOut * beside_.left;
+}
+
+/// Whether the pose lies beyond all others in some way, where nothing says what the arm does.
 bool Findings::is_beyond_others(const Accepted& one) const {
   const auto& all = all_.measurements;
   const auto out = std::find_if(all.begin(), all.end(), [&](const Measurement& m) { return m.row == one.pose.row; });
   if (out == all.end()) return false;
-  JointVector low = problem_.batch().measurements.front().context.q;
-  JointVector high = low;
+  VectorXd low = posture_of(problem_.model(), problem_.batch().measurements.front().context);
+  VectorXd high = low;
   for (const Measurement& m : problem_.batch().measurements) {
-    low = low.cwiseMin(m.context.q);
-    high = high.cwiseMax(m.context.q);
+    const VectorXd posture = posture_of(problem_.model(), m.context);
+    low = low.cwiseMin(posture);
+    high = high.cwiseMax(posture);
   }
-  const JointVector margin = thresholds::kBeyondOthers * (high - low);
-  return ((out->context.q - high - margin).array() > 0).any() || ((low - margin - out->context.q).array() > 0).any();
+  const VectorXd margin = thresholds::kBeyondOthers * (high - low);
+  const VectorXd posture = posture_of(problem_.model(), out->context);
+  return ((posture - high - margin).array() > 0).any() || ((low - margin - posture).array() > 0).any();
 }
 
 Cause Findings::named(const Accepted& one) const {
@@ -252,7 +275,8 @@ Finding Findings::cause(const Accepted& one) const {
   const ErrorFigures after = figures_of(problem_.positions(held_out_));
   const OwnEstimate own = own_estimate(problem_, one.in_model, estimated_.change, estimated_.covariance);
   const Evidence evidence{effect_rms, !beside_.more_than_noise || is_in_both_halves(one, effect, others),
-                          held_out_.squaredNorm() < without.squaredNorm(), is_unlikely(one.cause, own.size)};
+                          held_out_.squaredNorm() < without.squaredNorm(), is_unlikely(one.cause, own.size),
+                          static_cast<int>(own.size.size())};
   Judgement judgement = judge(one.cause, evidence, one.could_also_be, beside_);
   return {.cause = cause,
           .source = one.source,

@@ -8,7 +8,8 @@ namespace trammel::cause_search {
 /// What is left beside all that was found and has a name.
 struct Remainder {
   bool more_than_noise = false;
-  double rms = 0;  ///< m
+  double rms = 0;       ///< m
+  bool larger = false;  ///< than stated, and not by chance: perhaps more than noise
 };
 
 /// The findings of a search, each built once: its numbers beside everything else that was found (parameters by

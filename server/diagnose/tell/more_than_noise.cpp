@@ -46,6 +46,10 @@ LeftOver left_in_position(const Explained& explained) {
                                          : left_of(explained.after.position_spread());
 }
 
+NoiseVerdict worst_of(const Explained& explained) {
+  return std::max(judge_noise(left_in_position(explained)), judge_noise(left_of(explained.after.rotation_spread())));
+}
+
 /// The causes that the model has and whose numbers would have to stand beyond their bounds.
 std::vector<WrongSign> wrong_signs_of(const LinearProblem& served) {
   const Background all(served.nuisance());
@@ -200,16 +204,15 @@ double chance_of_noise(const LeftOver& left) {
 double vouched_by(const RepeatStatistics& repeats) { return scatter_beyond_noise(repeats) ? 1 : repeats.sigma_factor; }
 
 bool leaves_more_than_noise(const Explained& explained, const PreparedBatch& prepared) {
-  const NoiseVerdict worst =
-      std::max(judge_noise(left_in_position(explained)), judge_noise(left_of(explained.after.rotation_spread())));
-  return worst == NoiseVerdict::kMoreThanNoise || scatter_beyond_noise(prepared.repeats) ||
+  return worst_of(explained) == NoiseVerdict::kMoreThanNoise || scatter_beyond_noise(prepared.repeats) ||
          !sessions_beyond_noise(explained, prepared).empty();
 }
 
 Remainder remainder_of(const Explained& explained, const PreparedBatch& prepared, const Diagnosis& diagnosis) {
   const bool more = !explained.found.unnamed.empty() || leaves_more_than_noise(explained, prepared) ||
                     is_worse_held_out(prepared, diagnosis);
-  return {more, more ? rms_beyond(left_in_position(explained)) : 0};
+  const bool larger = worst_of(explained) >= NoiseVerdict::kLarger;
+  return {more, more || larger ? rms_beyond(left_in_position(explained)) : 0, larger};
 }
 
 void tell_noise(const Explained& explained, const PreparedBatch& prepared, Diagnosis& diagnosis) {
