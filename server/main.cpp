@@ -29,6 +29,7 @@
 #include "server/http/http_server.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
+#include "server/store/store_place.h"
 #include "server/trainer/compute/compute_main.h"
 #include "server/trainer/trainer.h"
 
@@ -214,19 +215,31 @@ int watch(CaughtSignals& signals, const Serving& serving) {
   }
 }
 
+/// Starts to answer; returns the server's name, which is its own for as long as that is held.
+Result<PortLock> open_to_clients(const DdsOptions& options, DdsService& service) {
+  // A second copy of this server is told about the port first.
+  const Status free = PortLock::take(options.address, options.port).map([](const PortLock&) {});
+  if (!free) return tl::make_unexpected(free.error());
+  auto name = PortLock::take_name(options.domain, options.server_id);
+  if (!name) return name;
+  if (const Status started = service.start(); !started) return tl::make_unexpected(started.error());
+  return name;
+}
+
 void hangs() { end_at_once("trammeld: hangs: was asked to stop and has not stopped after 10 s; ends at once\n"); }
 
 /// Serves until a signal ends it.
 Status serve(ServerConfig config, const Arguments& arguments) {
   CaughtSignals signals(hangs);  // before any thread of ours starts
-  auto store = Store::open(config.store);
+  auto store = Store::open(config.store, config.cache);
   if (!store) return tl::make_unexpected(store.error());
+  (*store)->works_as(config.dds.server_id);
   ModelRegistry registry(config.models_in_memory);
   Trainer trainer(config.cells, **store, registry, config.trainer);
   DdsService service(config.dds, trainer, **store, registry);
   HttpServer http(config.http,
-                  {config.dds.server_id, config.dds.program_version, config.store, trainer, **store, registry,
-                   [&service] { return service.figures(); }, [&service] { return service.movement(); }});
+                  {config.dds.server_id, config.dds.program_version, spoken_place(config.store), trainer, **store,
+                   registry, [&service] { return service.figures(); }, [&service] { return service.movement(); }});
   if (const Status listens = http.start(); !listens) return listens;
   service.set_call_listener(log_call);
   service.set_packet_listener([](const char* event, const std::string& what) { tell(LogLevel::kWarn, event, what); });
@@ -253,19 +266,20 @@ Status serve(ServerConfig config, const Arguments& arguments) {
   const auto notices = trainer.take_up();
   if (!notices) return tl::make_unexpected(notices.error());
   for (const std::string& notice : *notices) tell(LogLevel::kWarn, "notice", notice);
-  // A second copy of this server is told about the port first.
-  const Status free = PortLock::take(config.dds.address, config.dds.port).map([](const PortLock&) {});
-  if (!free) return free;
-  const auto name = PortLock::take_name(config.dds.domain, config.dds.server_id);
-  if (!name) return tl::make_unexpected(name.error());
-  if (const Status started = service.start(); !started) return started;
+  std::optional<PortLock> name;
+  if (config.serves) {
+    auto taken = open_to_clients(config.dds, service);
+    if (!taken) return tl::make_unexpected(taken.error());
+    name.emplace(std::move(*taken));
+  }
   if (const auto started = trainer.start(); !started) return tl::make_unexpected(started.error());
   http.set_phase(ServerPhase::kServing);
   const std::string pages =
       config.http.port == 0 ? "" : fmt::format(", pages on http://{}:{}", config.http.address, config.http.port);
   tell(LogLevel::kInfo, "ready",
        fmt::format("ready: {} serves {} cells on {}:{}, domain {}, store {}{}", config.dds.server_id,
-                   config.cells.size(), config.dds.address, config.dds.port, config.dds.domain, config.store, pages));
+                   config.cells.size(), config.dds.address, config.dds.port, config.dds.domain,
+                   spoken_place(config.store), pages));
   tell_manager_ready("serves");
 
   const int ended_by = watch(signals, {config, arguments, service, trainer, registry});
@@ -311,7 +325,8 @@ int main(int argc, char** argv) {
       ->required();
   app.add_flag("--check", arguments.check,
                "Only say all that a start or a first training would refuse, and change nothing");
-  app.add_option("--store", arguments.store, "Store (SQLite file) instead of the server file's");
+  app.add_option("--store", arguments.store,
+                 "Store (SQLite file, or URL of a PostgreSQL) instead of the server file's");
   app.add_option("--port", arguments.port, "UDP port where clients look for it, instead of the server file's")
       ->check(CLI::Range(1024, 65535));
   app.add_option("--domain", arguments.domain, "DDS domain instead of the server file's")->check(CLI::Range(0, 232));

@@ -101,7 +101,8 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
       : publisher_(publisher), subscriber_(subscriber), partition_(std::move(partition)), watch_(watch) {}
 
   /// The times that a request is sent. What all servers answer alike is asked of a second one where the first is silent
-  /// for kHedge, or leaves. At half of the time it is sent once more; what changes something to the same server only.
+  /// for kHedge, or leaves. At half of the time it is sent once more; what changes something to the same server, or to
+  /// another one where that one has left: servers of one record make a change once under its id.
   enum class Sending { kFirst, kHedge, kAgain };
 
   Result<Reply> attempt(Request& request, const Route& route, Clock::time_point deadline) {
@@ -111,7 +112,8 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     std::string first, last;      // servers
     for (const Sending sending : {Sending::kFirst, Sending::kHedge, Sending::kAgain}) {
       if (sending == Sending::kHedge && (!hedges || first.empty())) continue;
-      if (const auto server = find_server(sending, route, last, sending == Sending::kAgain ? deadline : half)) {
+      if (const auto server = find_server(sending, route, has_left(asked) ? std::string() : last,
+                                          sending == Sending::kAgain ? deadline : half)) {
         last = server->id();
         if (first.empty()) first = last;
         asked.insert(server->participant);
@@ -131,6 +133,15 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     return unanswered(last);
   }
 
+  /// Whether nobody of them is there any more.
+  [[nodiscard]] bool has_left(const std::set<std::string>& asked) const {
+    const MutexLock lock(mutex_);
+    return std::none_of(asked.begin(), asked.end(), [&](const std::string& participant) TRAMMEL_REQUIRES(mutex_) {
+      return readers_.contains(participant);
+    });
+  }
+
+  /// `last`: the one that was asked; empty: nobody, or it has left.
   [[nodiscard]] std::optional<KnownServer> find_server(Sending sending, const Route& route, const std::string& last,
                                                        Clock::time_point until) {
     if (sending == Sending::kHedge)

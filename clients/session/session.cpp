@@ -1,6 +1,7 @@
 #include "clients/session/session.h"
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <optional>
 #include <random>
@@ -44,6 +45,23 @@ wire::Change to_wire(const ChangeOptions& options) {
   change.id(change_id(options));
   change.expected_version(options.expected_version.value_or(-1));
   return change;
+}
+
+/// Whether two servers tell of one job: they have one record.
+bool is_same(const wire::Job& a, const wire::Job& b) {
+  return a.number() == b.number() && a.cell() == b.cell() && a.kind() == b.kind() &&
+         a.created_unix_s() == b.created_unix_s() && a.batch_ids() == b.batch_ids();
+}
+
+/// Adds what no other server has told already: several have one record.
+template <typename Item, typename IsSame>
+void add_new(std::vector<std::pair<Item, std::string>>& all, const std::vector<Item>& told, const std::string& server,
+             const IsSame& is_same) {
+  const auto before = static_cast<std::ptrdiff_t>(all.size());  // a server tells each once
+  for (const Item& item : told) {
+    const auto known = [&](const auto& other) { return is_same(other.first, item); };
+    if (std::none_of(all.begin(), all.begin() + before, known)) all.emplace_back(item, server);
+  }
 }
 
 /// Refuses a text with a NUL: strings on the wire end there, and the rest would be lost silently.
@@ -331,11 +349,22 @@ struct Session::Participant {
       auto asked = job_of_cell(server, number, cell);
       if (!asked) last = asked.error();
       if (!asked) continue;
+      if (found && is_same(found->second, *asked)) continue;
       if (found) return ambiguous(number, found->first, server);
       found = std::pair(server, std::move(*asked));
     }
     if (!found) return tl::make_unexpected(last);
     return *std::move(found);
+  }
+  /// The job as another server tells it that has the same record; empty: none does.
+  [[nodiscard]] std::optional<std::pair<std::string, wire::Job>> same_job(const wire::Job& wanted,
+                                                                          const std::string& not_of) {
+    for (const KnownServer& server : watch->wait_for_servers(options.servers.size(), Clock::now())) {
+      if (server.id() == not_of) continue;
+      auto asked = job(server.id(), wanted.number());
+      if (asked && is_same(wanted, *asked)) return std::pair(server.id(), std::move(*asked));
+    }
+    return std::nullopt;
   }
   [[nodiscard]] Result<wire::Job> job_of_cell(const std::string& server, std::int64_t number, const std::string& cell) {
     auto asked = job(server, number);
@@ -523,12 +552,13 @@ Result<DiagnosisAnswer> Session::diagnosis(const std::string& cell, std::int64_t
 namespace {
 
 std::vector<BatchOfService> batches_in(const std::vector<wire::ReadModelsReply>& replies) {
+  std::vector<std::pair<wire::BatchInfo, std::string>> told;
+  for (const wire::ReadModelsReply& reply : replies)
+    add_new(told, reply.batches(), reply.header().server().to_string(), std::equal_to<>());
   std::vector<BatchOfService> batches;
-  for (const wire::ReadModelsReply& reply : replies) {
-    for (const wire::BatchInfo& batch : reply.batches()) {
-      batches.push_back(from_wire(batch));
-      batches.back().server = reply.header().server().to_string();
-    }
+  for (const auto& [batch, server] : told) {
+    batches.push_back(from_wire(batch));
+    batches.back().server = server;
   }
   return batches;
 }
@@ -574,10 +604,11 @@ Result<std::int64_t> Session::release_and_train(const std::string& cell, const s
 Result<std::vector<DatedJob>> Session::jobs(const std::string& cell) {
   const auto replies = participant_->read_all(cell, wire::READ_JOBS);
   if (!replies) return tl::make_unexpected(replies.error());
+  std::vector<std::pair<wire::Job, std::string>> told;
+  for (const wire::ReadModelsReply& reply : *replies)
+    add_new(told, reply.jobs(), reply.header().server().to_string(), is_same);
   std::vector<DatedJob> jobs;
-  for (const wire::ReadModelsReply& reply : *replies) {
-    for (const wire::Job& job : reply.jobs()) jobs.push_back(from_wire(job, reply.header().server().to_string()));
-  }
+  for (const auto& [job, server] : told) jobs.push_back(from_wire(job, server));
   return jobs;
 }
 
@@ -703,8 +734,8 @@ Result<JobStatus> Session::wait_for_job(std::int64_t job, std::chrono::milliseco
   const auto deadline = Clock::now() + limit;
   const auto found = participant_->find_job(job);
   if (!found) return tl::make_unexpected(found.error());
-  const std::string& server = found->first;
-  JobStatus status = status_of(found->second);
+  auto [server, last] = *found;
+  JobStatus status = status_of(last);
   std::uint64_t seen = 0;
   while (true) {
     if (listener) listener(status);
@@ -720,12 +751,17 @@ Result<JobStatus> Session::wait_for_job(std::int64_t job, std::chrono::milliseco
       news = participant_->watch->wait_for_progress(server, job, seen, std::min(deadline, Clock::now() + kJobPoll));
       if (news) continue;
       const auto asked = participant_->job(server, job);
-      if (asked)
+      if (asked) {
         news = *asked;
-      else if (asked.error().code != ErrorCode::kUnreachable)
+      } else if (asked.error().code != ErrorCode::kUnreachable) {
         return tl::make_unexpected(asked.error());
+      } else if (auto other = participant_->same_job(last, server)) {
+        std::tie(server, news) = std::move(*other);
+        seen = 0;
+      }
     }
-    status = status_of(*news);
+    last = *news;
+    status = status_of(last);
   }
 }
 

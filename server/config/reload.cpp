@@ -63,6 +63,9 @@ ReloadPlan plan_reload(const ServerConfig& present, const ServerConfig& file) {
 
   leave("server", present.dds.server_id, file.dds.server_id, &plan.later);
   leave("store", present.store, file.store, &plan.later);
+  leave("cache", present.cache, file.cache, &plan.later);
+  leave("serves", present.serves, file.serves, &plan.later);
+  leave("trains", present.trainer.trains, file.trainer.trains, &plan.later);
   leave("dds: address", present.dds.address, file.dds.address, &plan.later);
   leave("dds: port", present.dds.port, file.dds.port, &plan.later);
   leave("dds: domain", present.dds.domain, file.dds.domain, &plan.later);

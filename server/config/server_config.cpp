@@ -11,6 +11,7 @@
 #include "server/base/text_file.h"
 #include "server/base/yaml_file.h"
 #include "server/compensate/model_spec.h"
+#include "server/store/store_place.h"
 
 namespace trammel {
 namespace {
@@ -264,13 +265,13 @@ std::vector<std::string> cell_files_of(const YamlMap& map, const std::filesystem
 
 std::string store_of(const YamlMap& map, const std::filesystem::path& folder) {
   const std::string store = map.text("store");
-  if (store.empty()) map.refuse("store", "expected a path");
-  return (folder / store).string();
+  if (store.empty()) map.refuse("store", "expected a path, or a URL of PostgreSQL");
+  return is_postgres_url(store) ? store : (folder / store).string();
 }
 
 void read_server_map(const YamlMap& map, const std::filesystem::path& folder, ServerFile& file) {
-  map.only({"version", "server", "cells", "store", "models_in_memory_mb", "replica", "record", "dds", "trainer", "log",
-            "http"});
+  map.only({"version", "server", "cells", "store", "cache", "models_in_memory_mb", "serves", "trains", "replica",
+            "record", "dds", "trainer", "log", "http"});
   map.attempt([&] {
     if (map.integer("version", 0) != 1)
       map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
@@ -279,15 +280,24 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
   map.attempt([&] { config.dds.server_id = server_id(map, "server"); });
   map.attempt([&] { file.cell_files = cell_files_of(map, folder); });
   map.attempt([&] { config.store = store_of(map, folder); });
+  map.attempt([&] { config.cache = (folder / map.text("cache", "trammel-cache")).string(); });
   map.attempt([&] {
     const auto otherwise = static_cast<int>(config.models_in_memory >> 20);
     config.models_in_memory =
         static_cast<std::size_t>(integer_within(map, "models_in_memory_mb", otherwise, 64, 1'000'000)) << 20;
   });
+  map.attempt([&] { config.serves = map.boolean("serves", true); });
+  map.attempt([&] {
+    config.trainer.trains = map.boolean("trains", true);
+    if (!config.serves && !config.trainer.trains)
+      map.refuse("trains", "a server that does not serve is there to train");
+  });
   map.attempt([&] {
     if (map.has("dds")) read_dds(map.map("dds"), folder, config.dds);
   });
   map.attempt([&] {
+    if (!map.is_null("replica") && is_postgres_url(config.store))
+      map.refuse("replica", "servers of one PostgreSQL are peers: leave it out");
     if (!map.is_null("replica")) read_replica(map.map("replica"), config.dds.server_id, config.dds.replica);
   });
   map.attempt([&] {

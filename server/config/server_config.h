@@ -19,8 +19,10 @@ constexpr std::size_t kMaxCells = 1024;  // of one server on the wire
 /// The configuration of a server.
 struct ServerConfig {
   std::map<std::string, std::shared_ptr<const Cell>> cells;  ///< by name
-  std::string store;                                         ///< path of the database
-  std::size_t models_in_memory = std::size_t{8192} << 20;    ///< bytes; beyond, those not used for longest leave it
+  std::string store;                                         ///< path of the file, or URL of a PostgreSQL
+  std::string cache;  ///< folder of the models last in force, where the store is a PostgreSQL
+  std::size_t models_in_memory = std::size_t{8192} << 20;  ///< bytes; beyond, those not used for longest leave it
+  bool serves = true;                                      ///< false: it works on jobs of a shared store only
   DdsOptions dds;
   TrainerOptions trainer;
   LogOptions log;

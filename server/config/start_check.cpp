@@ -10,6 +10,7 @@
 #include "server/dds/port_lock.h"
 #include "server/http/http_server.h"
 #include "server/store/store_check.h"
+#include "server/store/store_place.h"
 #include "server/trainer/dark_cells.h"
 
 namespace trammel {
@@ -85,7 +86,7 @@ StartCheck check_start(const ServerReading& server, const std::string& path, Sto
   const ServerConfig& config = server.config;
   StartCheck check{server.problems, {}, {}};
   Verdict verdict(path, whose, check);
-  const Status store = config.store.empty() ? Status() : check_store(config.store);
+  const Status store = config.store.empty() || is_postgres_url(config.store) ? Status() : check_store(config.store);
   Status port;
   if (was_read(server, "dds")) port = PortLock::take(config.dds.address, config.dds.port).map([](const PortLock&) {});
   if (is_held(store) && is_held(port)) {

@@ -25,16 +25,15 @@ Result<int> Handlers::changed(const std::string& cell, const wire::ManageModelsR
   const auto under = [&](const std::string& asked) {
     ChangeId id{request.change().id().to_string(), asked, who(request.header())};
     id.reason = request.reason();
-    return ChangeRequest{std::move(id), *expected};
+    id.expected_version = *expected;
+    return id;
   };
   switch (request.action()) {
     case wire::MANAGE_ROLLBACK:
       return trainer_.rollback(cell, under("roll back " + cell));
     case wire::MANAGE_IMPORT: {
       const std::string& text = request.model_text();
-      ChangeId id = under(in_few_words("import", cell, {text})).id;
-      id.expected_version = *expected;
-      return trainer_.import_model(cell, text, id);
+      return trainer_.import_model(cell, text, under(in_few_words("import", cell, {text})));
     }
     case wire::MANAGE_CANCEL_JOB:
       return cancel(cell, request.job(), who(request.header())).map([] { return 0; });

@@ -9,6 +9,9 @@
 /// The audit trail, for the transactions that change something.
 namespace trammel {
 
+/// Where a shared database tells that the trail has grown.
+constexpr const char* kChangesChannel = "trammel_changes";
+
 /// What a change did.
 struct AuditEntry {
   std::string cell, what, subject, before, after;

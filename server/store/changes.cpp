@@ -1,5 +1,7 @@
 #include "server/store/changes.h"
 
+#include <algorithm>
+
 #include "server/base/unix_time.h"
 #include "server/store/connection.h"
 
@@ -7,6 +9,16 @@ namespace trammel {
 namespace {
 
 constexpr std::int64_t kChangesKept = 100'000;
+
+/// Who put in force what is in force, and when, as a clause; empty: not recorded.
+std::string who_decided(Database& database, const std::string& cell) {
+  auto row = prepare(
+      database, "SELECT who, what, at FROM audit WHERE cell = $1 AND subject = 'in force' ORDER BY number DESC LIMIT 1",
+      cell);
+  if (!row.next()) return "";
+  const auto ago = std::max<std::int64_t>(unix_now() - row.integer64(2), 0);
+  return fmt::format("; {} did that ({}) {} s ago", row.text(0), row.text(1), ago);
+}
 
 }  // namespace
 
@@ -30,10 +42,16 @@ Status check_expected_version(Database& database, const std::string& cell, const
   const int version = row.next() ? row.integer(0) : 0;
   const int expected = *change_id.expected_version;
   if (version == expected) return {};
-  return failure(ErrorCode::kConflict, "cell {}: version {} is in force, not {} as expected", cell, version, expected)
+  return failure(ErrorCode::kConflict, "cell {}: version {} is in force, not {} as expected{}", cell, version, expected,
+                 who_decided(database, cell))
       .of("expected")
       .beyond(expected, version)
       .next("look again, and decide anew");
+}
+
+Status Store::check_expected(const std::string& cell, const ChangeId& change_id) const {
+  return connection_->exclusively(
+      [&](Database& database) { return check_expected_version(database, cell, change_id); });
 }
 
 void record_change(Database& database, const ChangeId& change_id, const ChangeOutcome& outcome) {

@@ -59,4 +59,12 @@ std::optional<std::chrono::seconds> StoreConnection::note_clock() {
   return step;
 }
 
+void StoreConnection::wait_without_word(const std::stop_token& stop, std::chrono::steady_clock::time_point until) {
+  Mutex mutex;  // local: used only to wait
+  Condition never;
+  MutexLock lock(mutex);
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - std::chrono::steady_clock::now());
+  never.wait_for(lock, stop, std::max(left, std::chrono::milliseconds(0)), [] { return false; });
+}
+
 }  // namespace trammel

@@ -4,12 +4,14 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <type_traits>
 #include <utility>
 
 #include "server/base/mutex.h"
 #include "server/base/result.h"
+#include "server/store/claim_rows.h"
 #include "server/store/clock_watch.h"
 #include "server/store/database/database.h"
 #include "server/store/served_copies.h"
@@ -43,6 +45,9 @@ class StoreConnection {
   [[nodiscard]] virtual bool is_shared() const = 0;
   /// Where it could not be written, or is not as it was left: whether it can be written now.
   [[nodiscard]] virtual Status try_again() = 0;
+  /// Returns when another server may have changed something, after `limit` at the latest, or when `stop` is requested.
+  /// For one thread.
+  virtual void wait_for_change(const std::stop_token& stop, std::chrono::milliseconds limit) = 0;
 
   [[nodiscard]] StoreState state() const;
   /// Tells those who wait that the state has changed.
@@ -55,12 +60,15 @@ class StoreConnection {
 
   const std::string path;  ///< a file, or a URL as it is told to people
   const std::unique_ptr<ServedCopies> copies;
-  mutable Mutex state_mutex;  // taken last, and for moments only
+  Worker worker = new_worker();  ///< its name is set before there are jobs
+  mutable Mutex state_mutex;     // taken last, and for moments only
   Condition state_changed;
   StoreState state_now TRAMMEL_GUARDED_BY(state_mutex);
   ClockWatch clock TRAMMEL_GUARDED_BY(state_mutex){ClockWatch::now()};
 
  protected:
+  /// The time passes.
+  static void wait_without_word(const std::stop_token& stop, std::chrono::steady_clock::time_point until);
   using Job = std::function<Status(Database&)>;
 
  private:

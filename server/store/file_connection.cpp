@@ -192,4 +192,8 @@ void FileConnection::leave_no_journal() {
   }
 }
 
+void FileConnection::wait_for_change(const std::stop_token& stop, std::chrono::milliseconds limit) {
+  wait_without_word(stop, std::chrono::steady_clock::now() + limit);
+}
+
 }  // namespace trammel

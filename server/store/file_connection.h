@@ -27,6 +27,7 @@ class FileConnection final : public StoreConnection {
 
   [[nodiscard]] bool is_shared() const override { return false; }
   [[nodiscard]] Status try_again() override;
+  void wait_for_change(const std::stop_token& stop, std::chrono::milliseconds limit) override;  // there is no other
 
  private:
   [[nodiscard]] Status read(const Job& job) override;

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "server/store/claim_rows.h"
 #include "server/store/database/database.h"
 #include "server/store/store.h"
 
@@ -19,7 +20,7 @@ void insert_job_batches(Database& database, std::int64_t job, const std::string&
 /// kNotFound: there is none.
 [[nodiscard]] Result<StoredJob> read_job(Database& database, std::int64_t id);
 /// Marks an unfinished job of `cell` (empty: any) done; kNotFound: there is none.
-[[nodiscard]] Status end_job(Database& database, std::int64_t id, const std::string& cell, int model_version,
-                             const std::string& message, const JobOutcome& outcome);
+[[nodiscard]] Status end_job(Database& database, const Worker& worker, std::int64_t id, const std::string& cell,
+                             int model_version, const std::string& message, const JobOutcome& outcome);
 
 }  // namespace trammel

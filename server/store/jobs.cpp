@@ -56,8 +56,9 @@ constexpr const char* kJobColumns =
     "SELECT id, cell, level, bias, state, message, created_at, model_version, attempts, "
     "CASE WHEN EXISTS (SELECT 1 FROM health_checks WHERE job = jobs.id) THEN 'check' ELSE kind END, started_at, "
     "finished_at, "
-    "verdict, before_m, after_m, limit_m, code, why, next_step, peak_bytes, processor_s "
-    "FROM jobs LEFT JOIN job_times ON job_times.job = jobs.id LEFT JOIN job_outcomes ON job_outcomes.job = jobs.id ";
+    "verdict, before_m, after_m, limit_m, code, why, next_step, peak_bytes, processor_s, job_claims.server "
+    "FROM jobs LEFT JOIN job_claims ON job_claims.job = jobs.id LEFT JOIN job_times ON job_times.job = jobs.id LEFT "
+    "JOIN job_outcomes ON job_outcomes.job = jobs.id ";
 
 /// The outcome in a row of kJobColumns.
 JobOutcome outcome_of(Rows& row) {
@@ -97,6 +98,7 @@ StoredJob job_of(Database& database, Rows& row) {
   job.started_at = optional_integer(row, 10);
   job.finished_at = optional_integer(row, 11);
   job.outcome = outcome_of(row);
+  if (job.state == JobState::kRunning) job.server = row.text(21);
   job.batch_ids = batches_of(database, job.id);
   return job;
 }
@@ -162,8 +164,9 @@ Result<StoredJob> read_job(Database& database, std::int64_t id) {
   return job_of(database, row);
 }
 
-Status end_job(Database& database, std::int64_t id, const std::string& cell, int model_version,
+Status end_job(Database& database, const Worker& worker, std::int64_t id, const std::string& cell, int model_version,
                const std::string& message, const JobOutcome& outcome) {
+  if (const Status held = check_held(database, worker, id); !held) return held;
   return changed_one(change(database,
                             "UPDATE jobs SET state = 'done', model_version = $1, message = $2 "
                             "WHERE id = $3 AND ($4 = '' OR cell = $4) AND state IN ('queued', 'running')",
@@ -308,6 +311,7 @@ Result<std::vector<StoredCheck>> Store::health_checks(const std::string& cell, s
 
 Status Store::store_findings(std::int64_t job, const std::string& findings, const std::string& page) {
   return connection_->in_transaction([&](Database& database) -> Status {
+    if (const Status held = check_held(database, connection_->worker, job); !held) return held;
     const int changes =
         change(database, "UPDATE diagnoses SET findings = $1, page = $2 WHERE job = $3", findings, page, job);
     change(database,
@@ -351,17 +355,13 @@ Result<std::vector<StoredJob>> Store::recent_jobs(const std::string& cell, int f
 
 Status Store::set_job_running(std::int64_t id) {
   return connection_->in_transaction([&](Database& database) {
-    return changed_one(change(database,
-                              "UPDATE jobs SET state = 'running', attempts = attempts + 1 "
-                              "WHERE id = $1 AND state IN ('queued', 'running')",
-                              id),
-                       id)
-        .map([&] { record_start(database, id); });
+    return claim_job(database, connection_->worker, id).map([&] { record_start(database, id); });
   });
 }
 
 Status Store::set_job_queued(std::int64_t id, bool attempt_counts) {
-  return connection_->in_transaction([&](Database& database) {
+  return connection_->in_transaction([&](Database& database) -> Status {
+    if (const Status held = check_held(database, connection_->worker, id); !held) return held;
     return changed_one(
         change(database,
                "UPDATE jobs SET state = 'queued', attempts = attempts - CASE WHEN attempts > 0 THEN $1 ELSE 0 END "
@@ -373,7 +373,8 @@ Status Store::set_job_queued(std::int64_t id, bool attempt_counts) {
 
 Status Store::set_job_failed(std::int64_t id, const std::string& message, const JobOutcome& outcome,
                              const std::string& who) {
-  return connection_->in_transaction([&](Database& database) {
+  return connection_->in_transaction([&](Database& database) -> Status {
+    if (const Status held = check_held(database, connection_->worker, id); !held) return held;
     return changed_one(change(database,
                               "UPDATE jobs SET state = 'failed', message = $1 "
                               "WHERE id = $2 AND state IN ('queued', 'running')",
@@ -388,7 +389,7 @@ Status Store::set_job_failed(std::int64_t id, const std::string& message, const 
 
 Status Store::set_job_done(std::int64_t id, const std::string& message, const JobOutcome& outcome) {
   return connection_->in_transaction([&](Database& database) {
-    return end_job(database, id, "", 0, message, outcome).map([&] {
+    return end_job(database, connection_->worker, id, "", 0, message, outcome).map([&] {
       record_job_end(database, id, to_text(outcome.verdict), message, {});
     });
   });

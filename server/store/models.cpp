@@ -177,7 +177,7 @@ Result<int> Store::add_model(const std::string& cell, const CompensatedModel& mo
          fmt::format("sha256 {}{}", model.provenance().hash, job == 0 ? "" : fmt::format(", of job {}", job)), message},
         change_id);
     if (job != 0) {
-      if (auto ended = end_job(database, job, cell, version, message, outcome); !ended)
+      if (auto ended = end_job(database, connection_->worker, job, cell, version, message, outcome); !ended)
         return tl::make_unexpected(ended.error());
     }
     if (put_in_force || release) release_batches_of(database, cell, version, change_id);

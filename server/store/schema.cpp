@@ -109,7 +109,7 @@ Status prepare_file(Database& database, const std::string& path) {
 Status check_readable(Database& database, const std::string& path) {
   if (auto owner = check_owner(database, path); !owner) return owner;
   const bool has_all =
-      database.has_table("audit_end") && database.has_table("versions_elsewhere") && database.has_table("cells");
+      database.has_table("audit_end") && database.has_table("cells") && database.has_table("job_claims");
   if (integer_of(database, "PRAGMA user_version") == kSchemaVersion && has_all) return {};
   return refused("of an older schema, and cannot be written").in(path);
 }

@@ -173,6 +173,13 @@ CREATE TABLE IF NOT EXISTS versions_elsewhere (
   cell   TEXT    PRIMARY KEY,
   newest INTEGER NOT NULL
 ) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS job_claims (
+  job          INTEGER PRIMARY KEY REFERENCES jobs (id),
+  server       TEXT    NOT NULL,
+  token        TEXT    NOT NULL,
+  lease_until  INTEGER NOT NULL,
+  cancelled_by TEXT
+);
 CREATE TABLE IF NOT EXISTS cells (
   cell         TEXT    PRIMARY KEY,
   last_version INTEGER NOT NULL

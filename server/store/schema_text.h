@@ -16,8 +16,9 @@ extern const char* const kSchemaAdded;  ///< what version 2 added to version 1
 /// programs that know none. How a version was judged when a person put it in force. And the changes that clients asked
 /// for under an id, with what came of them; what of the rest has lost its text; which batches nothing takes any more;
 /// and the store's identity. Of a server among others: which part it has (one row, or none), the batches
-/// that models were made of elsewhere, and the highest numbers of versions there. And of each cell the highest number
-/// that a version was given: its row is what is locked where several servers write.
+/// that models were made of elsewhere, and the highest numbers of versions there. Which server works on a job,
+/// which start of it (`token`), until when it is believed to live, and who wants the job to end. And of each cell the
+/// highest number that a version was given: its row is what is locked where several servers write.
 extern const char* const kTablesBeside;
 extern const char* const kAuditTables;
 

@@ -5,6 +5,7 @@
 #include <thread>
 #include <utility>
 
+#include "server/store/audit_rows.h"
 #include "server/store/schema.h"
 #include "server/store/shared_schema.h"
 #include "server/store/store_place.h"
@@ -171,6 +172,31 @@ std::string SharedConnection::who_holds() {
   }
   give_back(std::move(*connected));
   return who;
+}
+
+bool SharedConnection::hears_of_change(const std::stop_token& stop, Clock::time_point until) {
+  constexpr std::chrono::milliseconds kSlice{200};  // until it is seen that it is to stop
+  try {
+    if (!listener_) {
+      auto connected = connect();
+      if (!connected) return false;
+      listener_ = std::move(*connected);
+      listener_->execute(fmt::format("LISTEN {}", kChangesChannel));
+      return true;
+    }
+    while (!stop.stop_requested() && Clock::now() < until) {
+      if (listener_->hears(kSlice)) return true;
+    }
+  } catch (const DatabaseError&) {
+    listener_.reset();
+  }
+  return false;
+}
+
+void SharedConnection::wait_for_change(const std::stop_token& stop, std::chrono::milliseconds limit) {
+  const auto until = Clock::now() + limit;
+  if (state().readable && hears_of_change(stop, until)) return;
+  wait_without_word(stop, until);
 }
 
 Status SharedConnection::try_again() {

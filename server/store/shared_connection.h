@@ -19,6 +19,7 @@ class SharedConnection final : public StoreConnection {
 
   [[nodiscard]] bool is_shared() const override { return true; }
   [[nodiscard]] Status try_again() override;
+  void wait_for_change(const std::stop_token& stop, std::chrono::milliseconds limit) override;
 
  private:
   using Connected = std::unique_ptr<PostgresDatabase>;
@@ -37,6 +38,8 @@ class SharedConnection final : public StoreConnection {
   /// One that nobody uses, or a new one.
   [[nodiscard]] Result<Connected> borrow();
   void give_back(Connected connected);
+  /// Whether the word of a change came. Connects where needed: what changed before that is not told.
+  [[nodiscard]] bool hears_of_change(const std::stop_token& stop, Clock::time_point until);
   /// Who else holds rows locked, for people; empty: not known.
   [[nodiscard]] std::string who_holds();
 
@@ -46,6 +49,7 @@ class SharedConnection final : public StoreConnection {
   std::string identity_ TRAMMEL_GUARDED_BY(mutex_);  // of the store; empty: not known yet
   std::vector<Connected> idle_ TRAMMEL_GUARDED_BY(mutex_);
   std::size_t lent_ TRAMMEL_GUARDED_BY(mutex_) = 0;
+  Connected listener_;  // of the one thread that waits for changes
 };
 
 }  // namespace trammel

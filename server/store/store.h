@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -58,6 +59,13 @@ struct StoredJob {
   std::optional<std::int64_t> started_at = {};   ///< Unix time, s, of its last start; empty: not yet, or not recorded
   std::optional<std::int64_t> finished_at = {};  ///< likewise, of its end
   JobOutcome outcome = {};                       ///< the same as `message`, as data
+  std::string server = {};                       ///< that works on it; empty: none, or not recorded
+};
+
+/// What became of the claim on a job that runs here.
+struct ClaimState {
+  bool is_held = false;                          ///< false: the lease was over, and another server has taken the job
+  std::optional<std::string> cancelled_by = {};  ///< who asked another server that it ends; empty: nobody
 };
 
 /// The request of a diagnosis and its findings.
@@ -217,6 +225,24 @@ class Store {
   /// it until then: others use the store in between.
   [[nodiscard]] Result<bool> prune_one(const std::string& cell, const KeepRule& rule);
 
+  /// Several servers share it.
+  [[nodiscard]] bool is_shared() const;
+  /// How this server is called where it claims a job. Set before there are jobs.
+  void works_as(const std::string& server);
+  /// Tells that this server still works on the job that it claimed.
+  [[nodiscard]] Result<ClaimState> renew_claim(std::int64_t job);
+  /// Has the server that works on the job end it. Refuses (kConflict) where none does.
+  [[nodiscard]] Status ask_to_cancel(std::int64_t job, const std::string& who);
+  /// The jobs that wait and that no server works on that is believed to live, nor on another one of their cell.
+  [[nodiscard]] Result<std::set<std::int64_t>> jobs_to_take() const;
+  /// What was changed by changes that came after so many; see changes_made().
+  [[nodiscard]] Result<std::set<std::string>> cells_changed_after(std::int64_t changes) const;
+  /// Returns when another server may have changed something, after `limit` at the latest, or when `stop` is requested.
+  /// For one thread.
+  void wait_for_change(const std::stop_token& stop, std::chrono::milliseconds limit);
+  /// Refuses (kConflict) where another version of the cell is in force than the change expects.
+  [[nodiscard]] Status check_expected(const std::string& cell, const ChangeId& change_id) const;
+
   [[nodiscard]] Result<StoredJob> job(std::int64_t id) const;
   /// Queued and running jobs of all cells, oldest first: a restart must finish them. What cannot be read of them is
   /// left out, and stands in state().
@@ -224,8 +250,9 @@ class Store {
   /// Jobs of one cell or (empty) of all, oldest first: the unfinished ones, the last `finished` done and the last
   /// `finished` failed.
   [[nodiscard]] Result<std::vector<StoredJob>> recent_jobs(const std::string& cell, int finished) const;
-  /// These refuse (kNotFound) a job that is done or failed already. Setting it running counts an attempt; setting it
-  /// queued takes the attempt back, unless it counts.
+  /// These refuse (kNotFound) a job that is done or failed already, or that another server works on. Setting it running
+  /// claims it for this server and counts an attempt, and refuses (kConflict) one of a cell that another server works
+  /// for; setting it queued takes the attempt back, unless it counts.
   [[nodiscard]] Status set_job_running(std::int64_t id);
   [[nodiscard]] Status set_job_queued(std::int64_t id, bool attempt_counts = false);
   [[nodiscard]] Status set_job_failed(std::int64_t id, const std::string& message, const JobOutcome& outcome = {},

@@ -88,6 +88,14 @@ bool JobQueue::is_removed(std::int64_t id) {
   return false;
 }
 
+bool JobQueue::has(std::int64_t id) const {
+  const MutexLock lock(mutex_);
+  const auto is_it = [id](const WaitingJob& job) { return job.id == id; };
+  return taken_ == id || std::any_of(waiting_.begin(), waiting_.end(), [&](const auto& cell) {
+           return std::any_of(cell.second.begin(), cell.second.end(), is_it);
+         });
+}
+
 std::size_t JobQueue::size() const {
   const MutexLock lock(mutex_);
   std::size_t jobs = 0;

@@ -51,6 +51,8 @@ class JobQueue {
   /// Takes a job that waits out of the queue; false: it does not wait here.
   [[nodiscard]] bool remove(std::int64_t id);
 
+  /// Whether it waits here, or its turn has come.
+  [[nodiscard]] bool has(std::int64_t id) const;
   [[nodiscard]] std::size_t size() const;
   /// How many of the cell's were asked for.
   [[nodiscard]] std::size_t asked_for(const std::string& cell) const;

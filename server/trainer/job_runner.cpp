@@ -101,7 +101,9 @@ JobRunner::End JobRunner::run(std::int64_t id, const StopRequests& stop, const C
       return tl::make_unexpected(Failed{broken.value(), JobVerdict::kBroken});
     }
   }();
-  return attempted ? End::kOver : end(id, attempted.error(), stop, cancelled_by);
+  const End how = attempted ? End::kOver : end(id, attempted.error(), stop, cancelled_by);
+  claimed_ = 0;
+  return how;
 }
 
 JobRunner::Attempt JobRunner::attempt(std::int64_t id, const StopRequests& stop) {
@@ -111,7 +113,11 @@ JobRunner::Attempt JobRunner::attempt(std::int64_t id, const StopRequests& stop)
   const auto cell = find_cell(cells_.now(), job->cell);
   if (!cell) return failed(cell.error());
   const Status running = once_the_disk_lets(id, stop, [&] { return store_.set_job_running(id); });
-  if (!running) return failed(running.error());
+  if (!running) {
+    const bool elsewhere = running.error().code == ErrorCode::kConflict;
+    return tl::make_unexpected(Failed{running.error(), verdict_of(running.error()), false, {}, elsewhere});
+  }
+  claimed_ = id;
   book_.report(progress_at(*job, JobStage::kTraining));
   std::optional<StoredDiagnosis> asked;
   if (job->kind != JobKind::kTrain) {
@@ -275,6 +281,7 @@ JobRunner::Attempt JobRunner::finish(const StoredJob& job, const Made& made, con
 
 JobRunner::End JobRunner::end(std::int64_t id, const Failed& failed, const StopRequests& stop,
                               const CancelledBy& cancelled_by) {
+  if (failed.elsewhere) return End::kElsewhere;
   auto stored = store_.job(id);
   StoredJob job;
   job.id = id;
@@ -295,7 +302,7 @@ JobRunner::End JobRunner::end(std::int64_t id, const Failed& failed, const StopR
       id, {stop.service, {}}, [&] { return store_.set_job_failed(id, progress.what, progress.outcome, who); });
   if (ended) {
     book_.report(progress);
-  } else if (ended.error().code != ErrorCode::kNotFound) {  // else its model is stored: it has not failed
+  } else if (ended.error().code != ErrorCode::kNotFound) {  // else its model is stored, or it is another server's
     // The store has it as unfinished still: the next start takes it up.
     progress.stage = JobStage::kQueued;
     progress.what += "; the store does not take that: " + sentence(ended.error());

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -29,11 +30,14 @@ class JobRunner {
 
   using CancelledBy = std::function<std::string()>;
   enum class End {
-    kOver,  ///< it has an outcome
-    kAgain  ///< it is queued again: its computing broke off, or the service stops
+    kOver,      ///< it has an outcome
+    kAgain,     ///< it is queued again: its computing broke off, or the service stops
+    kElsewhere  ///< another server works on it, or on another job of its cell
   };
   /// `cancelled_by` says who asked for it to end, where somebody did.
   [[nodiscard]] End run(std::int64_t job, const StopRequests& stop, const CancelledBy& cancelled_by);
+  /// The job that is this server's now, until it is over; 0: none. Thread-safe.
+  [[nodiscard]] std::int64_t claimed() const { return claimed_; }
 
  private:
   /// How an attempt ended that made nothing.
@@ -42,6 +46,7 @@ class JobRunner {
     JobVerdict verdict = JobVerdict::kRefused;
     bool again = false;  ///< what broke off may do so once only
     ComputeCost cost = {};
+    bool elsewhere = false;  ///< it was not begun
   };
   using Attempt = tl::expected<void, Failed>;
 
@@ -87,6 +92,7 @@ class JobRunner {
   ModelHistory& history_;
   ProgressBook& book_;
   const TrainerOptions options_;
+  std::atomic<std::int64_t> claimed_ = 0;
 };
 
 }  // namespace trammel

@@ -29,7 +29,8 @@ constexpr std::size_t kMaxSources = 500;            // as in a cell file
 constexpr int kJobsListed = 20;                     // of those done and of those failed, the last ones
 constexpr std::chrono::seconds kLoadingAtStart{1};  // of models, before the service says that it is ready
 constexpr std::chrono::seconds kKeeperTick{1};
-constexpr int kKeeperNiceness = 5;  // answering comes before loading
+constexpr std::chrono::seconds kFollowTick{2};  // where no word came of a change
+constexpr int kKeeperNiceness = 5;              // answering comes before loading
 
 Status check_batch_id(const std::string& id) {
   if (id.empty()) return refused("a batch needs an id").of("batch");
@@ -93,6 +94,7 @@ Result<std::vector<std::string>> Trainer::take_up() {
   for (auto cell = served.begin(); cell != served.end() && std::chrono::steady_clock::now() < until; ++cell)
     static_cast<void>(registry_.in_force(cell->first));  // what fails is among the troubles
   for (const std::string& trouble : troubles()) notices.push_back(trouble);
+  queue_.hold(!options_.trains);
   auto unfinished = store_.unfinished_jobs();
   // The models are served all the same.
   if (!unfinished) notices.push_back("the jobs cannot be read: " + sentence(unfinished.error()));
@@ -119,6 +121,7 @@ Result<bool> Trainer::can_take_up(const StoredJob& job, std::vector<std::string>
     return false;
   }
   if (job.state != JobState::kRunning || job.attempts < kMaxAttempts) return true;
+  if (store_.is_shared() && !store_.set_job_running(job.id)) return false;  // another server works on it
   const std::string why = fmt::format("its training was interrupted by a crash {} times", job.attempts);
   const JobOutcome outcome = failed_outcome(failure(ErrorCode::kInternal, "{}", why).value(), JobVerdict::kBroken);
   if (auto failed = store_.set_job_failed(job.id, why, outcome); !failed) return tl::make_unexpected(failed.error());
@@ -149,6 +152,10 @@ Result<std::vector<std::string>> Trainer::start() {
         static_cast<void>(cancel(taken->job.id, queue_.cancelled_by()));
     }
   });
+  if (store_.is_shared()) {
+    // What was taken up before is looked at once more: it may have changed meanwhile.
+    follower_ = std::jthread([this](const std::stop_token& stop) { follow(0, stop); });
+  }
   keeper_ = std::jthread([this, told = troubles()](const std::stop_token& stop) { keep_up(told, stop); });
   reclaimer_ = std::jthread([this](const std::stop_token& stop) {
     ::pthread_setname_np(::pthread_self(), "reclaimer");
@@ -222,6 +229,62 @@ void Trainer::take_up_jobs(std::vector<StoredJob> jobs, std::vector<std::string>
   }
 }
 
+void Trainer::follow(std::int64_t followed, const std::stop_token& stop) {
+  ::pthread_setname_np(::pthread_self(), "follower");
+  while (!stop.stop_requested()) {
+    followed = follow_models(followed);
+    follow_jobs();
+    keep_claim();
+    store_.wait_for_change(stop, kFollowTick);
+  }
+}
+
+std::int64_t Trainer::follow_models(std::int64_t followed) {
+  const auto made = store_.changes_made();
+  if (!made || *made == followed) return followed;
+  const bool lost = *made < followed;
+  if (lost && trouble_listener_)
+    trouble_listener_(fmt::format("the record has {} changes and had {}: it is of an earlier moment", *made, followed),
+                      false);
+  const auto changed = store_.cells_changed_after(lost ? 0 : followed);
+  if (!changed) return followed;
+  for (const std::string& cell : *changed) {
+    if (cells().contains(cell)) history_.follow(cell);
+  }
+  return *made;
+}
+
+void Trainer::follow_jobs() {
+  const MutexLock lock(submit_mutex_);
+  const auto to_take = store_.jobs_to_take();
+  if (!to_take) return;
+  for (const JobProgress& known : book_.unfinished()) {
+    if (to_take->contains(known.job) || known.job == runner_.claimed()) continue;
+    const auto job = store_.job(known.job);
+    if (!job || !book_.find(known.job)) continue;
+    const bool is_over = job->state == JobState::kDone || job->state == JobState::kFailed;
+    const JobProgress now = stored_progress(*job);
+    if (is_over) static_cast<void>(queue_.remove(known.job));
+    if (is_over || now.stage != known.stage) book_.report(now);
+  }
+  std::vector<std::string> notices;  // the start of a server says them
+  for (const std::int64_t id : *to_take) {
+    if (queue_.has(id)) continue;
+    auto job = store_.job(id);
+    if (!job || !can_take_up(*job, notices).value_or(false)) continue;
+    job->state = JobState::kQueued;
+    enqueue(*job, was_asked_for(*job).value_or(true));
+  }
+}
+
+void Trainer::keep_claim() {
+  const std::int64_t job = runner_.claimed();
+  if (job == 0) return;
+  const auto claim = store_.renew_claim(job);
+  if (!claim) return;  // a record that is away lets nobody else claim it, either
+  if (!claim->is_held || claim->cancelled_by) static_cast<void>(queue_.cancel(job, claim->cancelled_by.value_or("")));
+}
+
 void Trainer::tell_troubles(std::vector<std::string>& told) {
   std::vector<std::string> now = troubles();
   if (now == told) return;
@@ -251,8 +314,10 @@ std::vector<std::string> Trainer::troubles() const {
 
 void Trainer::stop() {
   if (!worker_.joinable()) return;
-  for (std::jthread* thread : {&worker_, &keeper_}) thread->request_stop();
-  for (std::jthread* thread : {&worker_, &keeper_}) thread->join();
+  for (std::jthread* thread : {&worker_, &keeper_, &follower_}) thread->request_stop();
+  for (std::jthread* thread : {&worker_, &keeper_, &follower_}) {
+    if (thread->joinable()) thread->join();
+  }
   reclaimer_.request_stop();
   reclaimer_.join();
 }
@@ -423,6 +488,10 @@ Status Trainer::cancel(std::int64_t id, const std::string& who) {
   if (!asked_for) return tl::make_unexpected(asked_for.error());
   const auto over = [id] { return failure(ErrorCode::kConflict, "job {} is over", id).of("job").with_value(id); };
   if (job->state == JobState::kDone || job->state == JobState::kFailed) return over();
+  if (store_.is_shared() && job->state == JobState::kRunning && runner_.claimed() != id) {
+    static_cast<void>(queue_.remove(id));
+    return store_.ask_to_cancel(id, who);
+  }
   switch (queue_.cancel(id, who)) {
     case JobQueue::Cancelled::kStopping:
       return {};
@@ -444,20 +513,16 @@ Status Trainer::cancel(std::int64_t id, const std::string& who) {
   return {};
 }
 
-Status Trainer::activate(const std::string& cell, int version, const ChangeRequest& request, bool force) {
-  std::optional<GateVerdict> judged;
-  if (!request.expected || *request.expected == registry_.version_in_force(cell)) {
-    const auto made = store_.outcome_of(request.id);
-    if (!made) return tl::make_unexpected(made.error());
-    if (!*made) {
-      auto verdict = judged_beside_present(cell, version);
-      if (!verdict && !force) return tl::make_unexpected(verdict.error());
-      if (verdict) judged = std::move(*verdict);
-    }
-    const Status wanted = judged && !force ? check_not_worse(cell, version, *judged) : Status();
-    if (!wanted) return wanted;
-  }
-  return history_.activate(cell, version, request, judged);
+Status Trainer::activate(const std::string& cell, int version, const ChangeId& id, bool force) {
+  const auto made = store_.outcome_of(id);
+  if (!made) return tl::make_unexpected(made.error());
+  if (*made) return {};
+  if (const Status as_seen = store_.check_expected(cell, id); !as_seen) return as_seen;
+  const auto judged = judged_beside_present(cell, version);
+  if (!judged && !force) return tl::make_unexpected(judged.error());
+  const std::optional<GateVerdict> verdict = judged ? *judged : std::nullopt;
+  const Status wanted = verdict && !force ? check_not_worse(cell, version, *verdict) : Status();
+  return wanted ? history_.activate(cell, version, id, verdict) : wanted;
 }
 
 Result<std::optional<GateVerdict>> Trainer::judged_beside_present(const std::string& cell_name, int version) const {
@@ -549,9 +614,13 @@ Result<JobProgress> Trainer::progress(std::int64_t job) const {
   if (auto running = book_.find(job)) return *running;
   const auto stored = store_.job(job);
   if (!stored) return tl::make_unexpected(stored.error());
-  JobProgress progress = progress_of(*stored);
-  const auto present = registry_.in_force(stored->cell);
-  progress.in_force = present && stored->model_version != 0 && present->version == stored->model_version;
+  return stored_progress(*stored);
+}
+
+JobProgress Trainer::stored_progress(const StoredJob& job) const {
+  JobProgress progress = progress_of(job);
+  const auto present = registry_.in_force(job.cell);
+  progress.in_force = present && job.model_version != 0 && present->version == job.model_version;
   return progress;
 }
 
@@ -569,7 +638,7 @@ Result<std::vector<Trainer::DatedJob>> Trainer::jobs(const std::string& cell_nam
 
 void Trainer::set_decides(bool decides) {
   history_.set_decides(decides);
-  queue_.hold(!decides);
+  queue_.hold(!decides || !options_.trains);
 }
 
 Result<int> Trainer::adopt(const std::string& cell, const VersionInForce& decided, const std::string& text,

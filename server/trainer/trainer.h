@@ -115,10 +115,9 @@ class Trainer {
   /// See ModelHistory. Any version is judged first, as a new one would be: where it is worse on the same poses than the
   /// one in force it is refused with the figures, unless `force` says that it is wanted. So is an imported one that
   /// cannot be judged.
-  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeRequest& request = {},
-                                bool force = false);
-  [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeRequest& request = {}) {
-    return history_.rollback(cell, request);
+  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeId& id = {}, bool force = false);
+  [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeId& id = {}) {
+    return history_.rollback(cell, id);
   }
   [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text, const ChangeId& id = {}) {
     return history_.import_model(cell, text, id);
@@ -169,11 +168,21 @@ class Trainer {
   void prune(const std::string& cell, const std::stop_token& stop);
   /// Of a store that can be read only now.
   void take_up_late();
+  /// Where several servers share the store: takes up what others changed, and keeps the claim on the job that runs.
+  void follow(std::int64_t followed, const std::stop_token& stop);
+  /// What is in force since `followed` changes; returns how many there are.
+  [[nodiscard]] std::int64_t follow_models(std::int64_t followed);
+  /// Which jobs wait, run elsewhere or are over.
+  void follow_jobs();
+  /// Ends the computing of a job that is no longer this server's, or that somebody cancelled on another one.
+  void keep_claim();
   /// Those of cells that are served, as far as they do not wait here already.
   void take_up_jobs(std::vector<StoredJob> jobs, std::vector<std::string>& notices) TRAMMEL_REQUIRES(submit_mutex_);
   void tell_troubles(std::vector<std::string>& told);
   /// Refuses (kBusy) where as many jobs that were asked for wait for this cell as may.
   [[nodiscard]] Status check_room(const std::string& cell) const;
+  /// Of a job as the store has it.
+  [[nodiscard]] JobProgress stored_progress(const StoredJob& job) const;
   /// The job that was queued under this id before; empty: none.
   [[nodiscard]] Result<std::optional<std::int64_t>> queued_before(const ChangeId& id) const;
   void enqueue(const StoredJob& job, bool asked_for);
@@ -210,7 +219,7 @@ class Trainer {
   JobQueue queue_;
   std::optional<std::vector<StoredJob>> taken_up_;  // between take_up() and start()
   Mutex submit_mutex_;  // one at a time between the look at what is there and the push: who may push
-  std::jthread worker_, keeper_, reclaimer_;
+  std::jthread worker_, keeper_, follower_, reclaimer_;
 };
 
 }  // namespace trammel

@@ -212,19 +212,19 @@ TEST_F(TrainerFaults, ActivatingWhatIsServedPublishesNothing) {
 TEST_F(TrainerFaults, AChangeThatExpectsAnotherModelInForceIsRefusedAndARepeatedOneIsNot) {
   add_models("cell-7", 3);
   start();
-  const ChangeRequest request{{"robot-3:1", "activate 1"}, 3};
+  const ChangeId request{"robot-3:1", "activate 1", "", "", 3};
   ASSERT_TRUE(trainer_->activate("cell-7", 1, request));
   EXPECT_EQ(served(), 1);
   stop();
   start();
   EXPECT_TRUE(trainer_->activate("cell-7", 1, request)) << "it is done already";
-  const auto other = trainer_->rollback("cell-7", {{"robot-3:2", "rollback"}, 3});
+  const auto other = trainer_->rollback("cell-7", {"robot-3:2", "rollback", "", "", 3});
   ASSERT_FALSE(other);
   EXPECT_EQ(other.error().code, ErrorCode::kConflict);
-  EXPECT_EQ(demand(trainer_->rollback("cell-7", {{"robot-3:3", "rollback"}, 1})), 3);
+  EXPECT_EQ(demand(trainer_->rollback("cell-7", {"robot-3:3", "rollback", "", "", 1})), 3);
   stop();
   start();
-  EXPECT_EQ(demand(trainer_->rollback("cell-7", {{"robot-3:3", "rollback"}, 1})), 3);
+  EXPECT_EQ(demand(trainer_->rollback("cell-7", {"robot-3:3", "rollback", "", "", 1})), 3);
   EXPECT_EQ(served(), 3) << "once";
 }
 

@@ -280,6 +280,18 @@ void PostgresDatabase::execute(const std::string& statements) {
   static_cast<void>(answer(std::chrono::steady_clock::now() + kAnswer));
 }
 
+bool PostgresDatabase::hears(milliseconds limit) {
+  if (lost_) lose("");
+  if (is_ready(::PQsocket(connection_.get()), POLLIN, std::chrono::steady_clock::now() + limit))
+    check_sent(::PQconsumeInput(connection_.get()));
+  bool heard = false;
+  while (PGnotify* word = ::PQnotifies(connection_.get())) {
+    heard = true;
+    ::PQfreemem(word);
+  }
+  return heard;
+}
+
 Rows PostgresDatabase::run(const char* sql, Values values) {
   return Rows(std::make_unique<PostgresRows>(ask(sql, values)));
 }

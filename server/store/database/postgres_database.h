@@ -26,6 +26,9 @@ class PostgresDatabase final : public Database {
   [[nodiscard]] bool has_table(const std::string& name) override;
   [[nodiscard]] bool is_shared() const override { return true; }
 
+  /// Whether a word came, within `limit`, of a channel that it listens to.
+  [[nodiscard]] bool hears(std::chrono::milliseconds limit);
+
   /// The connection is lost, or an answer did not come in time: nothing more comes through it.
   [[nodiscard]] bool is_lost() const { return lost_; }
 

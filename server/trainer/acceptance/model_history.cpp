@@ -129,35 +129,34 @@ Result<CompensatedModel> ModelHistory::load_for_service(const std::string& cell,
   return model;
 }
 
-Status ModelHistory::check_expected(const std::string& cell, const ChangeRequest& request) const {
-  if (!request.expected) return {};
-  const int version = registry_.version_in_force(cell);
-  if (version == *request.expected) return {};
-  return failure(ErrorCode::kConflict, "cell {}: version {} is in force, not {} as expected", cell, version,
-                 *request.expected)
-      .of("expected")
-      .beyond(*request.expected, version)
-      .next("look again, and decide anew");
-}
-
-Status ModelHistory::activate(const std::string& cell, int version, const ChangeRequest& request,
+Status ModelHistory::activate(const std::string& cell, int version, const ChangeId& id,
                               const std::optional<GateVerdict>& judged) {
   if (auto found = find_cell(cells_.now(), cell); !found) return tl::make_unexpected(found.error());
-  const auto made = store_.outcome_of(request.id);
+  const auto made = store_.outcome_of(id);
   if (!made) return tl::make_unexpected(made.error());
   if (*made) return {};
   auto model = registry_.version(cell, version);
   if (!model) return tl::make_unexpected(model.error());
   const MutexLock lock(changes_of(cell));
-  const auto made_meanwhile = store_.outcome_of(request.id);
+  const auto made_meanwhile = store_.outcome_of(id);
   if (!made_meanwhile) return tl::make_unexpected(made_meanwhile.error());
   if (*made_meanwhile) return {};
   if (auto decides = check_decides(cell); !decides) return decides;
-  if (auto as_expected = check_expected(cell, request); !as_expected) return as_expected;
   const std::optional<JobOutcome> figures = judged ? std::optional(outcome_of(*judged)) : std::nullopt;
-  if (auto activated = store_.activate(cell, version, request.id, figures); !activated) return activated;
+  if (auto activated = store_.activate(cell, version, id, figures); !activated) return activated;
   if (registry_.version_in_force(cell) != version) put_in_force(std::move(*model));
   return {};
+}
+
+void ModelHistory::follow(const std::string& cell) {
+  const auto decided = store_.version_in_force(cell);
+  if (!decided || !*decided || **decided == registry_.version_in_force(cell)) return;
+  auto model = registry_.version(cell, **decided);
+  const MutexLock lock(changes_of(cell));
+  const auto now = store_.version_in_force(cell);
+  if (!now || *now != *decided || **now == registry_.version_in_force(cell)) return;  // that change is followed next
+  if (!model) return registry_.announce(cell, **now);  // whoever asks for it hears why it is not served
+  put_in_force(std::move(*model));
 }
 
 Result<ModelHistory::WayBack> ModelHistory::way_back(const std::string& cell) const {
@@ -179,10 +178,10 @@ Result<std::pair<int, ServedModelPtr>> ModelHistory::load_first(const std::strin
   return tl::make_unexpected(*why_not);
 }
 
-Result<int> ModelHistory::rollback(const std::string& cell, const ChangeRequest& request) {
+Result<int> ModelHistory::rollback(const std::string& cell, const ChangeId& id) {
   if (auto found = find_cell(cells_.now(), cell); !found) return tl::make_unexpected(found.error());
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
-    const auto made = store_.outcome_of(request.id);
+    const auto made = store_.outcome_of(id);
     if (!made) return tl::make_unexpected(made.error());
     if (*made) return (*made)->version;
     // Loading takes a while: nobody waits for it.
@@ -193,8 +192,11 @@ Result<int> ModelHistory::rollback(const std::string& cell, const ChangeRequest&
     const MutexLock lock(changes_of(cell));
     if (const auto now = way_back(cell); !now || *now != *way) continue;
     if (auto decides = check_decides(cell); !decides) return tl::make_unexpected(decides.error());
-    if (auto as_expected = check_expected(cell, request); !as_expected) return tl::make_unexpected(as_expected.error());
-    const auto restored = store_.rollback(cell, found->first, request.id);
+    ChangeId decided = id;
+    if (!decided.expected_version) decided.expected_version = way->version_now;
+    const auto restored = store_.rollback(cell, found->first, decided);
+    const bool changed_elsewhere = !restored && restored.error().code == ErrorCode::kConflict && !id.expected_version;
+    if (changed_elsewhere) continue;
     if (!restored) return restored;
     put_in_force(std::move(found->second));
     return restored;
@@ -302,13 +304,17 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate, const Judging& judgi
   const std::string& cell = candidate.job.cell;
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
     if (stop.stop_requested()) return failure(ErrorCode::kBusy, "the service stops");
+    if (store_.is_shared()) follow(cell);
     // Judging takes a while: nobody waits for it. Where somebody changed what is in force meanwhile, it is done again.
     const auto present = registry_.in_force(cell);
     const int version = present ? present->version : 0;
     auto found = judged(candidate, judging, present.get());
     if (!found) return tl::make_unexpected(found.error());
     const MutexLock lock(changes_of(cell));
-    if (registry_.version_in_force(cell) == version) return store(candidate, std::move(*found));
+    if (registry_.version_in_force(cell) != version) continue;
+    auto kept = store(candidate, *found);
+    const bool changed_elsewhere = !kept && kept.error().code == ErrorCode::kConflict;
+    if (!changed_elsewhere) return kept;
   }
   const MutexLock lock(changes_of(cell));
   auto found = judged(candidate, judging, registry_.in_force(cell).get());
@@ -324,8 +330,11 @@ Result<Kept> ModelHistory::store(const Candidate& candidate, Judged judged) {
     judged.outcome.why = "another server decides now what is in force";
     judged.message = fmt::format("not in force: {} ({})", judged.outcome.why, judged.message);
   }
+  ChangeId decided;
+  // Of a store with one server the cell's lock says the same.
+  if (judged.put_in_force && store_.is_shared()) decided.expected_version = registry_.version_in_force(cell);
   const auto version = store_.add_model(cell, candidate.model, candidate.job.id, judged.put_in_force, judged.message,
-                                        judged.release, {}, judged.outcome);
+                                        judged.release, decided, judged.outcome);
   if (!version) return tl::make_unexpected(version.error());
   auto served = registry_.reclaimed({cell, *version, candidate.model});
   if (judged.put_in_force) {

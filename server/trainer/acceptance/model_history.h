@@ -40,12 +40,6 @@ struct Kept {
   JobOutcome outcome;   ///< the same as data
 };
 
-/// A change of what is in force, as somebody asks for it.
-struct ChangeRequest {
-  ChangeId id = {};                  ///< it happens once under this id
-  std::optional<int> expected = {};  ///< the version served now, 0: none; with another one (kConflict) nothing changes
-};
-
 /// What is wrong with the model that a cell is served with, or why it is served with none.
 struct CellTrouble {
   enum class Kind {
@@ -91,14 +85,17 @@ class ModelHistory {
   [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const;
   /// Puts a stored version in force and publishes it. A version that is served already is not published again.
   /// `judged`: how it did beside the one in force.
-  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeRequest& request = {},
+  [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeId& id = {},
                                 const std::optional<GateVerdict>& judged = {});
   /// Back to the version in force before, or the last one before it that can be served; returns it. Refuses (kBusy)
   /// where others change what is in force all the time.
-  [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeRequest& request = {});
+  [[nodiscard]] Result<int> rollback(const std::string& cell, const ChangeId& id = {});
   /// Takes a model file from elsewhere into the history, not in force; returns its version, the present one when the
   /// same model is there already. Refuses one of another cell, robot or tool.
   [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text, const ChangeId& id = {});
+
+  /// Serves the cell with the version that the store has in force: another server may have put it there.
+  void follow(const std::string& cell);
 
   /// What another server decides: false, and nothing goes in force here but by adopt(). At the start: true.
   void set_decides(bool decides) { decides_ = decides; }
@@ -126,8 +123,6 @@ class ModelHistory {
   [[nodiscard]] Result<ServedModel> load_in_force(const std::string& cell);
   /// Empty: there is none any more.
   void set_trouble(const std::string& cell, const std::optional<CellTrouble>& trouble);
-  /// The cell's lock is held, or what it guards is looked at again when it is.
-  [[nodiscard]] Status check_expected(const std::string& cell, const ChangeRequest& request) const;
   /// Where a rollback leads.
   struct WayBack {
     int version_now = 0;

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+#include "server/store/database/database.h"
+
+/// Who works on a job, for the transactions of jobs and models.
+namespace trammel {
+
+/// For so long a server is believed to live that has not been heard of: what it works on is taken up by another one
+/// within 20 s of its end.
+constexpr std::chrono::seconds kLease{15};
+
+/// Whoever works on jobs through one connection.
+struct Worker {
+  std::string server;  ///< as people know it
+  std::string token;   ///< of this start of it: what a start before claimed is not its own
+};
+
+/// Has a token of its own, and no name.
+[[nodiscard]] Worker new_worker();
+
+/// Sets the job running, claims it for the worker and counts an attempt. Refuses (kNotFound) one that is over,
+/// (kConflict) one of a cell that another server works for.
+[[nodiscard]] Status claim_job(Database& database, const Worker& worker, std::int64_t job);
+/// Refuses (kNotFound) a running job that another worker has claimed, also where that one is dead.
+[[nodiscard]] Status check_held(Database& database, const Worker& worker, std::int64_t job);
+
+}  // namespace trammel

@@ -1,0 +1,144 @@
+#include <optional>
+#include <random>
+
+#include "server/store/cell_rows.h"
+#include "server/store/claim_rows.h"
+#include "server/store/connection.h"
+#include "server/store/statements.h"
+#include "server/store/store.h"
+
+// Which server works on a job, and until when it is believed to live.
+
+namespace trammel {
+namespace {
+
+/// Times of claims are the database's: servers have clocks of their own.
+std::int64_t now_of(Database& database) {
+  return integer_of(database, database.is_shared() ? "SELECT CAST(EXTRACT(EPOCH FROM clock_timestamp()) AS bigint)"
+                                                   : "SELECT unixepoch()");
+}
+
+struct Claim {
+  std::string server, token;
+  std::int64_t lease_until = 0;  ///< Unix time, s
+};
+
+std::optional<Claim> claim_of(Database& database, std::int64_t job) {
+  auto row = prepare(database, "SELECT server, token, lease_until FROM job_claims WHERE job = $1", job);
+  if (!row.next()) return std::nullopt;
+  return Claim{row.text(0), row.text(1), row.integer64(2)};
+}
+
+void lock_job(Database& database, std::int64_t job) {
+  if (database.is_shared()) static_cast<void>(exists(database, "SELECT 1 FROM jobs WHERE id = $1 FOR UPDATE", job));
+}
+
+Failure held_elsewhere(ErrorCode code, std::int64_t job, const std::string& server) {
+  return failure(code, "job {} is worked on by {}", job, server).of("job").with_value(job);
+}
+
+/// Refuses where another server that is believed to live works on the job, or on another one of its cell.
+Status check_free(Database& database, const Worker& worker, std::int64_t job, const std::string& cell) {
+  if (!database.is_shared()) return {};
+  const std::int64_t now = now_of(database);
+  auto rows = prepare(database,
+                      "SELECT job, server FROM job_claims JOIN jobs ON jobs.id = job_claims.job "
+                      "WHERE jobs.cell = $1 AND jobs.state = 'running' AND token <> $2 AND lease_until > $3",
+                      cell, worker.token, now);
+  if (!rows.next()) return {};
+  return held_elsewhere(ErrorCode::kConflict, rows.integer64(0), rows.text(1));
+}
+
+}  // namespace
+
+Worker new_worker() {
+  std::random_device random;
+  return {"", fmt::format("{:08x}{:08x}{:08x}{:08x}", random(), random(), random(), random())};
+}
+
+Status check_held(Database& database, const Worker& worker, std::int64_t job) {
+  if (!database.is_shared()) return {};  // whoever else held a job of this file is gone
+  lock_job(database, job);
+  const auto claim = claim_of(database, job);
+  if (!claim || claim->token == worker.token) return {};
+  if (!exists(database, "SELECT 1 FROM jobs WHERE id = $1 AND state = 'running'", job)) return {};
+  return held_elsewhere(ErrorCode::kNotFound, job, claim->server);
+}
+
+Status claim_job(Database& database, const Worker& worker, std::int64_t job) {
+  const std::string cell = [&] {
+    auto row = prepare(database, "SELECT cell FROM jobs WHERE id = $1", job);
+    return row.next() ? row.text(0) : std::string();
+  }();
+  lock_cell(database, cell);
+  lock_job(database, job);
+  if (const Status free = check_free(database, worker, job, cell); !free) return free;
+  const int begun = change(
+      database,
+      "UPDATE jobs SET state = 'running', attempts = attempts + 1 WHERE id = $1 AND state IN ('queued', 'running')",
+      job);
+  if (begun != 1)
+    return failure(ErrorCode::kNotFound, "job {} does not exist or is finished", job).of("job").with_value(job);
+  change(database,
+         "INSERT INTO job_claims (job, server, token, lease_until, cancelled_by) VALUES ($1, $2, $3, $4, NULL) "
+         "ON CONFLICT (job) DO UPDATE SET server = excluded.server, token = excluded.token, "
+         "lease_until = excluded.lease_until, cancelled_by = NULL",
+         job, worker.server, worker.token, now_of(database) + kLease.count());
+  return {};
+}
+
+bool Store::is_shared() const { return connection_->is_shared(); }
+
+void Store::works_as(const std::string& server) { connection_->worker.server = server; }
+
+void Store::wait_for_change(const std::stop_token& stop, std::chrono::milliseconds limit) {
+  connection_->wait_for_change(stop, limit);
+}
+
+Result<ClaimState> Store::renew_claim(std::int64_t job) {
+  return connection_->in_transaction([&](Database& database) -> Result<ClaimState> {
+    auto row =
+        prepare(database, "UPDATE job_claims SET lease_until = $1 WHERE job = $2 AND token = $3 RETURNING cancelled_by",
+                now_of(database) + kLease.count(), job, connection_->worker.token);
+    ClaimState state;
+    state.is_held = row.next();
+    if (state.is_held && !row.is_null(0)) state.cancelled_by = row.text(0);
+    return state;
+  });
+}
+
+Status Store::ask_to_cancel(std::int64_t job, const std::string& who) {
+  return connection_->in_transaction([&](Database& database) -> Status {
+    const int asked = change(database,
+                             "UPDATE job_claims SET cancelled_by = $1 WHERE job = $2 AND job IN "
+                             "(SELECT id FROM jobs WHERE state = 'running')",
+                             who, job);
+    if (asked == 1) return {};
+    return failure(ErrorCode::kConflict, "job {} is not worked on", job).of("job").with_value(job);
+  });
+}
+
+Result<std::set<std::int64_t>> Store::jobs_to_take() const {
+  return connection_->exclusively([&](Database& database) -> Result<std::set<std::int64_t>> {
+    auto rows = prepare(database,
+                        "SELECT id FROM jobs WHERE state IN ('queued', 'running') AND NOT EXISTS "
+                        "(SELECT 1 FROM jobs AS other JOIN job_claims ON job = other.id WHERE other.cell = jobs.cell "
+                        "AND other.state = 'running' AND (other.id = jobs.id OR token <> $1) "
+                        "AND (token = $1 OR lease_until > $2))",
+                        connection_->worker.token, now_of(database));
+    std::set<std::int64_t> jobs;
+    while (rows.next()) jobs.insert(rows.integer64(0));
+    return jobs;
+  });
+}
+
+Result<std::set<std::string>> Store::cells_changed_after(std::int64_t changes) const {
+  return connection_->exclusively([&](Database& database) -> Result<std::set<std::string>> {
+    auto rows = prepare(database, "SELECT DISTINCT cell FROM audit WHERE number > $1", changes);
+    std::set<std::string> cells;
+    while (rows.next()) cells.insert(rows.text(0));
+    return cells;
+  });
+}
+
+}  // namespace trammel

@@ -1,0 +1,138 @@
+// Who works on a job where several servers share a store.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <memory>
+#include <set>
+#include <thread>
+#include <vector>
+
+#include "server/base/hash.h"
+#include "server/store/store.h"
+#include "tests/support/demand.h"
+#include "tests/support/postgres.h"
+#include "tests/support/small_cell.h"
+#include "tests/support/temporary_folder.h"
+
+namespace trammel {
+namespace {
+
+using test::demand;
+
+/// Two servers of one PostgreSQL.
+class Claims : public testing::Test {
+ protected:
+  Claims() : one_(open("one")), other_(open("other")) {}
+  std::unique_ptr<Store> open(const std::string& server) {
+    auto store = demand(Store::open(url_, folder_.file(server)));
+    store->works_as(server);
+    return store;
+  }
+  std::int64_t submit(const std::string& cell, const std::string& id) {
+    const std::string csv = "q1_deg\n" + id + "\n";
+    StoredJob job;
+    job.cell = cell;
+    job.batch_ids = {id};
+    return demand(one_->add_batch({cell, id, csv, sha256_hex(csv), "client:1", 1700000000, 12}, job)).id;
+  }
+  /// As if the server had not been heard of for longer than its lease.
+  void let_lease_pass(std::int64_t job) {
+    test::Postgres::of_program().sql(url_, fmt::format("UPDATE job_claims SET lease_until = 1 WHERE job = {}", job));
+  }
+  static int add_model(Store& store, std::int64_t job) {
+    const auto cell = test::small_cell("cell-7");
+    const auto made = store.add_model("cell-7", test::nominal_model(cell, 60), job, true, "made");
+    return made ? *made : 0;
+  }
+
+  test::TemporaryFolder folder_;
+  const std::string url_ = test::Postgres::of_program().new_store();
+  std::unique_ptr<Store> one_, other_;
+};
+
+TEST_F(Claims, AJobThatAServerWorksOnIsTakenByNobodyElse) {
+  const std::int64_t job = submit("cell-7", "b1");
+  EXPECT_TRUE(demand(other_->jobs_to_take()).contains(job));
+  ASSERT_TRUE(one_->set_job_running(job));
+  EXPECT_EQ(other_->set_job_running(job).error().code, ErrorCode::kConflict);
+  EXPECT_TRUE(demand(other_->jobs_to_take()).empty());
+  EXPECT_EQ(demand(other_->job(job)).server, "one");
+  EXPECT_EQ(demand(other_->job(job)).attempts, 1);
+}
+
+TEST_F(Claims, OneCellIsTrainedByOneServerAtATimeAndAnotherCellMeanwhile) {
+  const std::int64_t first = submit("cell-7", "b1"), second = submit("cell-7", "b2"), of_eight = submit("cell-8", "b1");
+  ASSERT_TRUE(one_->set_job_running(first));
+  EXPECT_EQ(other_->set_job_running(second).error().code, ErrorCode::kConflict);
+  EXPECT_EQ(demand(other_->job(second)).state, JobState::kQueued) << "it waits";
+  EXPECT_EQ(demand(other_->jobs_to_take()), std::set<std::int64_t>{of_eight});
+  EXPECT_TRUE(other_->set_job_running(of_eight));
+  ASSERT_TRUE(one_->set_job_done(first, "done"));
+  EXPECT_TRUE(other_->set_job_running(second));
+}
+
+TEST_F(Claims, OfManyServersThatWantAJobOneGetsIt) {
+  const std::int64_t job = submit("cell-7", "b1");
+  std::atomic<int> got = 0;
+  std::vector<std::unique_ptr<Store>> servers;
+  for (int i = 0; i < 4; ++i) servers.push_back(open(fmt::format("server-{}", i)));
+  {
+    std::vector<std::jthread> wanting;
+    for (const auto& server : servers)
+      wanting.emplace_back([&got, &server, job] { got += server->set_job_running(job) ? 1 : 0; });
+  }
+  EXPECT_EQ(got, 1);
+  EXPECT_EQ(demand(one_->job(job)).attempts, 1);
+}
+
+TEST_F(Claims, AServerThatWasNotHeardOfLosesItsJobAndStoresNothingOfItAfterwards) {
+  const std::int64_t job = submit("cell-7", "b1");
+  ASSERT_TRUE(one_->set_job_running(job));
+  let_lease_pass(job);
+  EXPECT_TRUE(demand(one_->renew_claim(job)).is_held) << "nobody else wanted it";
+  let_lease_pass(job);
+  EXPECT_TRUE(demand(other_->jobs_to_take()).contains(job));
+  ASSERT_TRUE(other_->set_job_running(job));
+  EXPECT_EQ(demand(other_->job(job)).attempts, 2);
+  EXPECT_FALSE(demand(one_->renew_claim(job)).is_held);
+  EXPECT_EQ(add_model(*one_, job), 0) << "it slept, and somebody else does the job";
+  EXPECT_EQ(one_->set_job_failed(job, "late").error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(one_->set_job_queued(job).error().code, ErrorCode::kNotFound);
+  let_lease_pass(job);
+  EXPECT_EQ(add_model(*one_, job), 0) << "also where that one is gone, too";
+  EXPECT_EQ(add_model(*other_, job), 1);
+  EXPECT_EQ(demand(one_->models("cell-7")).size(), 1U);
+}
+
+TEST_F(Claims, WhoRunsAJobHearsThatAnotherServerWasAskedToEndIt) {
+  const std::int64_t job = submit("cell-7", "b1");
+  EXPECT_EQ(other_->ask_to_cancel(job, "anna").error().code, ErrorCode::kConflict) << "nobody works on it";
+  ASSERT_TRUE(one_->set_job_running(job));
+  EXPECT_FALSE(demand(one_->renew_claim(job)).cancelled_by);
+  ASSERT_TRUE(other_->ask_to_cancel(job, "anna"));
+  EXPECT_EQ(demand(one_->renew_claim(job)).cancelled_by, "anna");
+}
+
+TEST_F(Claims, AServerHearsOfAChangeOfAnotherAndWhichCellItWas) {
+  std::stop_source never;
+  other_->wait_for_change(never.get_token(), std::chrono::seconds(30));  // connects, and hears from then on
+  const std::int64_t known = demand(other_->changes_made());
+  submit("cell-8", "b1");
+  other_->wait_for_change(never.get_token(), std::chrono::hours(1));
+  EXPECT_GT(demand(other_->changes_made()), known);
+  EXPECT_EQ(demand(other_->cells_changed_after(known)), std::set<std::string>{"cell-8"});
+}
+
+TEST_F(Claims, AFileHasOneServerAndAClaimOfAStartBeforeIsNobodys) {
+  one_ = demand(Store::open(folder_.file("trammel.db")));
+  const std::int64_t job = submit("cell-7", "b1");
+  ASSERT_TRUE(one_->set_job_running(job));
+  one_.reset();
+  one_ = demand(Store::open(folder_.file("trammel.db")));
+  ASSERT_TRUE(one_->set_job_running(job));
+  EXPECT_EQ(demand(one_->job(job)).attempts, 2);
+  EXPECT_TRUE(one_->set_job_done(job, "done"));
+}
+
+}  // namespace
+}  // namespace trammel
