@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <random>
 
 #include "server/calibrate/calibrate.h"
 #include "server/calibrate/frames/frames.h"
 #include "server/calibrate/identify/weighting.h"
+#include "server/calibrate/sessions/session_setting.h"
 #include "server/error_sources/catalogue.h"
 #include "server/measurement/sessions.h"
 
@@ -23,6 +25,9 @@ constexpr double kMuchLess = 0.25;  // of what was left
 constexpr double kEquations = 1.5;  // for each parameter, of the rows that are fitted
 constexpr std::size_t kMostRows = 300;  // evenly drawn beyond, while rows are looked for
 constexpr int kMostSteps = 12;
+constexpr std::size_t kPlacing = 4, kPlacingTool = 3;  // rows that place the base, and so many more for each tool
+constexpr int kDraws = 300;  // of seven rows of which two in five are bad all are good in 1 of 36 draws
+constexpr double kNear = 3e-3, kNearTurn = 5e-3;  // m, rad: by so much an arm is off its drawing
 
 MeasurementBatch only(const MeasurementBatch& batch, const Rows& rows) {
   MeasurementBatch some = batch;
@@ -66,11 +71,13 @@ class RowSearch {
     if (before < kAsked * sigma_) return all;
     const MeasurementBatch few = only(batch_, drawn(all.size(), kMostRows));
     std::optional<CalibrationResult> found;
-    for (const std::vector<std::string>& start : {sources_, frames(), std::vector<std::string>()}) {
-      if (found && start.empty()) break;  // the drawn arm, where rows are so bad that nothing fits all of them
-      std::optional<CalibrationResult> one = concentrated(few, fitted(start, few));
+    const auto begin_at = [&](std::optional<CalibrationResult> start) {
+      std::optional<CalibrationResult> one = concentrated(few, std::move(start));
       if (one && (!found || left(*one) < left(*found))) found = std::move(one);
-    }
+    };
+    begin_at(fitted(sources_, few));
+    begin_at(fitted(frames(), few));
+    if (!found) begin_at(placed_by_few(few));
     if (!found || left(*found) > kMuchLess * before) return all;
     const Rows rows = readmitted(std::move(*found), before);
     return static_cast<double>(rows.size()) < kAgreeing * static_cast<double>(all.size()) ? all : rows;
@@ -91,6 +98,41 @@ class RowSearch {
     for (const causes::Part part : {causes::Part::kBase, causes::Part::kTool})
       if (corrects(sources_, part)) names.emplace_back(cause_correcting(part).spelling);
     return names;
+  }
+
+  [[nodiscard]] std::size_t rows_that_place() const {
+    const auto& tools = cell_->tools;
+    const auto unknown = std::count_if(tools.begin(), tools.end(), [](const auto& tool) { return !tool.second; });
+    return kPlacing + kPlacingTool * static_cast<std::size_t>(unknown);
+  }
+
+  /// Base and tools by a few rows: of many draws the one that most rows are near to.
+  [[nodiscard]] std::optional<CalibrationResult> placed_by_few(const MeasurementBatch& rows) const {
+    std::optional<CalibrationResult> best;
+    std::ptrdiff_t most = 0;
+    std::mt19937_64 random(1);
+    for (int draw = 0; draw < kDraws; ++draw) {
+      std::optional<CalibrationResult> one = fitted(frames(), only(rows, some_of(rows.measurements.size(), random)));
+      if (!one) continue;
+      const Eigen::VectorXd off =
+          farness_of(rows, residuals_of(one->model, rows, one->model.values), {kNear, kNearTurn, true});
+      const auto near = std::count_if(off.begin(), off.end(), [](double far) { return far <= 1; });
+      if (near <= most) continue;
+      most = near;
+      best = std::move(one);
+    }
+    return best;
+  }
+
+  /// So many that they place base and tools.
+  [[nodiscard]] Rows some_of(std::size_t count, std::mt19937_64& random) const {
+    Rows rows = all_rows(count);
+    const std::size_t wanted = std::min(count, rows_that_place());
+    for (std::size_t i = 0; i < wanted; ++i)
+      std::swap(rows[i], rows[i + static_cast<std::size_t>(random() % (count - i))]);
+    rows.resize(wanted);
+    std::sort(rows.begin(), rows.end());
+    return rows;
   }
 
   /// How far each row of `rows` is off, beside how far a good one may be.
@@ -153,12 +195,53 @@ class RowSearch {
   const double sigma_;
 };
 
+/// `cell` with its base wherever a session's rows say.
+std::shared_ptr<const Cell> anywhere(const Cell& cell) {
+  auto other = std::make_shared<Cell>(cell);
+  other->X_WB.reset();
+  return other;
+}
+
+/// Each session by itself: where its instrument stood, and what it measured of the arm as it was.
+Rows agreeing_in_sessions(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
+                          const MeasurementBatch& batch) {
+  const std::shared_ptr<const Cell> placed = anywhere(*cell);
+  const std::vector<MeasurementBatch> sessions = by_session(batch);
+  std::vector<Rows> rows_of(sessions.size());
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i)
+    rows_of[static_cast<std::size_t>(batch.measurements[i].session)].push_back(i);
+  Rows all;
+  for (std::size_t s = 0; s < sessions.size(); ++s) {
+    if (rows_of[s].empty()) continue;
+    const auto alone = calibrate(placed, sources, sessions[s], {});
+    for (const std::size_t row : RowSearch(placed, sources, sessions[s]).agreeing(alone))
+      all.push_back(rows_of[s][row]);
+  }
+  std::sort(all.begin(), all.end());
+  return all;
+}
+
+/// m, the most that is left of one session beyond the stated sigma.
+double most_left(const CalibrationResult& found) {
+  double most = 0;
+  for (const SessionSetting& session : found.sessions) most = std::max(most, session.own_noise);
+  return std::hypot(found.discrepancy, most);
+}
+
+Rows agreeing_rows(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
+                   const MeasurementBatch& batch, const Result<CalibrationResult>& plain) {
+  if (!has_sessions(batch)) return RowSearch(cell, sources, batch).agreeing(plain);
+  const double sigma = stated_sigma(batch, *cell);
+  if (plain && std::hypot(sigma, most_left(*plain)) < kAsked * sigma) return all_rows(batch.measurements.size());
+  return agreeing_in_sessions(cell, sources, batch);
+}
+
 }  // namespace
 
 std::optional<Agreement> agreement_of(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
                                       const MeasurementBatch& batch, const Result<CalibrationResult>& plain) {
-  if (has_sessions(batch) || batch.measurements.empty()) return std::nullopt;
-  const Rows rows = RowSearch(cell, sources, batch).agreeing(plain);
+  if (batch.measurements.empty()) return std::nullopt;
+  const Rows rows = agreeing_rows(cell, sources, batch, plain);
   if (rows.size() == batch.measurements.size()) return std::nullopt;
   Rows others;
   const Rows all = all_rows(batch.measurements.size());
@@ -167,8 +250,9 @@ std::optional<Agreement> agreement_of(const std::shared_ptr<const Cell>& cell, c
 }
 
 void add_suspects(const MeasurementBatch& others, CalibrationResult& found) {
-  const Residuals r = residuals_of(found.model, others, found.model.values);
-  std::vector<SuspectPose> named = off_by(others, r, {found.discrepancy, found.discrepancy_rotation, true});
+  const MeasurementBatch here = aligned(others, found.sessions, found.model.cell->tracker);
+  const Residuals r = residuals_of(found.model, here, found.model.values);
+  std::vector<SuspectPose> named = off_by(here, r, {found.discrepancy, found.discrepancy_rotation, true});
   named.insert(named.end(), found.suspects.begin(), found.suspects.end());
   std::stable_sort(named.begin(), named.end(), [](const auto& a, const auto& b) { return a.sigmas > b.sigmas; });
   found.suspects = std::move(named);

@@ -72,6 +72,57 @@ TEST(Agreement, UpToTwoRowsInFiveMayBeBadAndEachOfThemIsNamed) {
   }
 }
 
+/// The shipped cell that does not say where its base is, or its tool.
+std::shared_ptr<const Cell> cell_without(bool base, bool tool) {
+  auto cell = std::make_shared<Cell>(*test::cell_7());
+  if (base) cell->X_WB.reset();
+  if (tool) cell->tools["spindle"].reset();
+  return cell;
+}
+
+/// As an instrument sees them that stands anywhere.
+void see_from_elsewhere(MeasurementBatch& batch, double angle) {
+  const Pose X = pose_zyx({2.5, -1.5, 0.4}, angle, 0.02, -0.03);
+  for (Measurement& m : batch.measurements) m.p_W = X * m.p_W;
+}
+
+TEST(Agreement, RowsThatAreFarOffLeadToNoArmWhereBaseOrToolAreUnknownAndAreNamedAllTheSame) {
+  for (const auto& [base, tool] : {std::pair(true, false), std::pair(false, true), std::pair(true, true)}) {
+    const auto cell = cell_without(base, tool);
+    for (const double share : {0.2, 0.4}) {
+      MeasurementBatch batch = positions(60, 13);
+      if (base) see_from_elsewhere(batch, 1.9);
+      const std::set<int> bad = spoil(batch, share, 1, 7);
+      EXPECT_FALSE(calibrate(cell, kM3, batch, {})) << "no fit on all rows leads anywhere";
+      EXPECT_EQ(named(cell, batch), bad) << "base unknown " << base << ", tool unknown " << tool << ", " << share;
+    }
+  }
+}
+
+TEST(Agreement, EachOfSeveralSessionsIsAskedByItself) {
+  const auto cell = test::cell_7();
+  MeasurementBatch batch = positions(60, 14), earlier = positions(50, 15);
+  std::set<int> bad = spoil(batch, 0.3, 20e-3, 8);
+  const std::set<int> bad_earlier = spoil(earlier, 0.4, 0.5, 9);
+  see_from_elsewhere(earlier, -0.7);
+  for (Measurement& m : earlier.measurements) {
+    if (bad_earlier.contains(m.row)) bad.insert(m.row + 1000);
+    m.row += 1000;
+  }
+  for (Measurement& m : batch.measurements) m.session = 1;
+  batch.measurements.insert(batch.measurements.begin(), earlier.measurements.begin(), earlier.measurements.end());
+  batch.sessions = {"earlier", "newest"};
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i) batch.measurements[i].context.index = static_cast<int>(i);
+  const auto found = agreement(cell, kM3, batch);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(rows_of(found->others), bad);
+  CalibrationResult good = test::demand(calibrate(cell, kM3, found->agreeing, {}));
+  EXPECT_LT(to_mm(good.rms), 0.05);
+  add_suspects(found->others, good);
+  for (const SuspectPose& pose : good.suspects)
+    EXPECT_NEAR(to_mm(pose.distance), pose.row > 1000 ? 500 : 20, 0.5) << "row " << pose.row;
+}
+
 TEST(Agreement, TwoReflectorsThatWereExchangedInAQuarterOfThePosesAreFound) {
   auto cell = std::make_shared<Cell>(*test::cell_7());
   const Pose spindle = *cell->tools.at("spindle");

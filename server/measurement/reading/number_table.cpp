@@ -1,7 +1,6 @@
 #include "server/measurement/reading/number_table.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <string>
 
