@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "server/measurement/pose_groups.h"
 #include "server/numerics/product.h"
 
 namespace trammel::cause_search {
@@ -25,12 +26,14 @@ VectorXd ones_without(Index rows, const std::vector<Index>& held) {
 }  // namespace
 
 Folds::Folds(const LinearProblem& problem, MatrixXd columns) : columns_(std::move(columns)) {
-  const Index folds = std::min(kFolds, problem.poses());
-  const Index run = std::max<Index>(1, problem.poses() / (folds * kRunsPerFold));
+  const std::vector<PoseGroup> poses = pose_groups(problem.batch());
+  const Index folds = std::min(kFolds, std::ssize(poses));
+  const Index run = std::max<Index>(1, std::ssize(poses) / (folds * kRunsPerFold));
   held_.resize(static_cast<std::size_t>(folds));
-  for (Index i = 0; i < problem.poses(); ++i) {
-    std::vector<Index>& rows = held_[static_cast<std::size_t>((i / run) % folds)];
-    for (Index k = 0; k < problem.row_count(i); ++k) rows.push_back(problem.first_row(i) + k);
+  for (Index p = 0; p < std::ssize(poses); ++p) {
+    std::vector<Index>& rows = held_[static_cast<std::size_t>((p / run) % folds)];
+    for (const Index i : poses[static_cast<std::size_t>(p)])
+      for (Index k = 0; k < problem.row_count(i); ++k) rows.push_back(problem.first_row(i) + k);
   }
   total_ = MatrixXd::Identity(columns_.cols(), columns_.cols());
   for (const std::vector<Index>& rows : held_) {

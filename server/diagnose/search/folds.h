@@ -8,7 +8,8 @@
 namespace trammel::cause_search {
 
 /// Poses held out in turn: short runs of poses that were measured one after the other, dealt to a few folds, so that
-/// what creeps along with time does not leak from the poses next to a held-out one. Every fold fits `columns` (R x p,
+/// what creeps along with time does not leak from the poses next to a held-out one. All rows of a joint vector are one
+/// pose. Every fold fits `columns` (R x p,
 /// whitened, in units of priors) to the rows of all others.
 class Folds {
  public:
