@@ -80,6 +80,19 @@ std::string apart_text(const Pose& a, const Pose& b) {
                      to_deg(pose_difference(a, b).tail<3>().norm()));
 }
 
+bool same_place(const Pose& a, const Pose& b) {
+  constexpr double kSamePlace = 1e-5;  // m
+  constexpr double kSameTurn = 9e-5;   // rad, 0.005 deg
+  return (a.translation() - b.translation()).norm() <= kSamePlace &&
+         pose_difference(a, b).tail<3>().norm() <= kSameTurn;
+}
+
+std::string against_row(const std::string& row, const Pose& X, const Pose& by_files, const std::string& place) {
+  if (same_place(X, by_files)) return "";
+  return fmt::format("{} is {} by --frames and {} by {}: {}", row, pose_text(X), pose_text(by_files), place,
+                     apart_text(X, by_files));
+}
+
 bool take_row(const std::string& row, const ReadOptions& options, ProgramTool& tool) {
   tool.row = row;
   const auto given = options.frames.find(row);

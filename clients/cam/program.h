@@ -254,6 +254,12 @@ constexpr const char* kRobotBase = "robot_base";
 /// `2.500 mm and 0.0000 deg apart`
 [[nodiscard]] std::string apart_text(const Pose& a, const Pose& b);
 
+/// The same place and turn as far as tools and frames are compared.
+[[nodiscard]] bool same_place(const Pose& a, const Pose& b);
+/// Why a row of --frames cannot hold beside what the files say at a place, both seen from the same; empty: it can.
+[[nodiscard]] std::string against_row(const std::string& row, const Pose& X, const Pose& by_files,
+                                      const std::string& place);
+
 /// Gives a tool or frame the value of a row of --frames, which it may have. Whether there is such a row.
 bool take_row(const std::string& row, const ReadOptions& options, ProgramTool& tool);
 bool take_row(const std::string& row, const ReadOptions& options, ProgramFrame& frame);

@@ -17,16 +17,9 @@ namespace trammel::cam {
 
 namespace {
 
-constexpr double kSamePlace = 1e-5;   // m
-constexpr double kSameTurn = 9e-5;    // rad, 0.005 deg
 constexpr double kSameLength = 1e-4;  // m: both are the drawing's
 constexpr std::size_t kFewest = 3;    // digits of a reach: R2700, R900
 constexpr double kSameReach = 0.06;   // m: 0.58 is also called 0.6
-
-bool same_base(const Pose& a, const Pose& b) {
-  return (a.translation() - b.translation()).norm() <= kSamePlace &&
-         pose_difference(a, b).tail<3>().norm() <= kSameTurn;
-}
 
 std::string place_of(const StatedBase& base) {
   return base.line == 0 ? fmt::format("{} of {}", base.name, base.file)
@@ -230,7 +223,7 @@ Status check_stated_robot(const Program& program, const Chain& robot) {
   std::vector<Error> problems;
   for (const StatedBase& base : program.bases) {
     const StatedBase& first = program.bases.front();
-    if (same_base(base.X_WB, first.X_WB)) continue;
+    if (same_place(base.X_WB, first.X_WB)) continue;
     Failure two =
         refused("the robot stands at {} in the controller's world by {}, at {} by {}: {}", pose_text(first.X_WB),
                 place_of(first), pose_text(base.X_WB), place_of(base), apart_text(first.X_WB, base.X_WB))
@@ -251,12 +244,12 @@ Status check_stated_robot(const Program& program, const Chain& robot) {
 }
 
 std::vector<std::string> notes_on_base(const Program& program, const CellTools& cell) {
-  if (program.bases.empty() || same_base(program.bases.front().X_WB, Pose::Identity())) return {};
+  if (program.bases.empty() || same_place(program.bases.front().X_WB, Pose::Identity())) return {};
   const StatedBase& base = program.bases.front();
   std::string stands =
       fmt::format("the robot stands at {} in the controller's world, by {}: targets are taken from there",
                   pose_text(base.X_WB), place_of(base));
-  if (cell.X_WB && !same_base(*cell.X_WB, base.X_WB))
+  if (cell.X_WB && !same_place(*cell.X_WB, base.X_WB))
     stands += fmt::format("; the cell's base, {}, is seen from its measuring system", pose_text(*cell.X_WB));
   std::vector<std::string> notes = {stands};
   std::vector<std::string> rows;

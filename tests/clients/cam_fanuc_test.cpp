@@ -281,5 +281,99 @@ TEST(Fanuc, APointThatNoMotionGoesToIsANoteAndNothingThatIsLeft) {
       << made.program.notes[0];
 }
 
+std::string with_frame(const std::string& x, const std::string& more = "") {
+  return program(setting("UFRAME[1]", {x, "0", "500", "0", "0", "0"}) + more + "   9:L P[1] 100mm/sec FINE ;\n",
+                 position(1, kXyz));
+}
+ReadOptions frame_at(double x) { return {.frames = {{"UFRAME[1]", make_pose(Matrix3::Identity(), {x, 0, .5})}}}; }
+
+TEST(Fanuc, ARowOfFramesThatContradictsWhatTheProgramSetsLeavesThePointWithBothValues) {
+  const test::Corrected apart = ls(with_frame("1500"), frame_at(1.5025));
+  for (const char* part : {"UFRAME[1] is [1502.500, 0.000, 500.000]", "by --frames and [1500.000, 0.000, 500.000]",
+                           "p1.ls line 13", "2.500 mm"})
+    EXPECT_NE(why(apart, "P[1]").find(part), std::string::npos) << why(apart, "P[1]");
+  EXPECT_TRUE(row_of(ls(with_frame("1500"), frame_at(1.5)).program, "P[1]").corrected());
+  const std::string tool = program(
+      setting("UTOOL[2]", {"100", "0", "153", "0", "-45", "0"}) + "   9:L P[1] 100mm/sec FINE ;\n", position(1, kXyz));
+  EXPECT_NE(why(ls(tool), "P[1]").find("UTOOL[2] is [100.000, 0.000, 150.000]"), std::string::npos)
+      << why(ls(tool), "P[1]");
+}
+
+TEST(Fanuc, AProgramsFrameIsHeldAgainstARowAsTheRobotStandsInTheWorld) {
+  ReadOptions read = frame_at(1.5);
+  read.frames.emplace("robot_base", make_pose(Matrix3::Identity(), {0, 0, .8}));
+  EXPECT_FALSE(row_of(ls(with_frame("1500"), read).program, "P[1]").corrected());
+  read.frames.at("UFRAME[1]").translation().z() = -.3;
+  EXPECT_EQ(why(ls(with_frame("1500"), read), "P[1]").find("by --frames"), std::string::npos)
+      << why(ls(with_frame("1500"), read), "P[1]");
+}
+
+TEST(Fanuc, AFrameThatTheProgramChangesAtRunTimeIsLeftWhateverTheRowSays) {
+  for (const char* line :
+       {"UFRAME[1]=PR[7]", "UFRAME[R[1]]=PR[7]", "PR[6]=LPOS", "PR[R[1]]=LPOS", "PR[GP1:6]=LPOS", "PR[6,1]=PR[6,1]+(5)",
+        "IF (DI[1]),PR[6,1]=(200)", "IF (DI[1]),UFRAME[1]=PR[7]", "PR[6,2]=(-1)"}) {
+    const test::Corrected made = ls(with_frame("1500", fmt::format("   8:  {} ;\n", line)), frame_at(1.5));
+    EXPECT_FALSE(row_of(made.program, "P[1]").corrected()) << line;
+  }
+  const std::string elsewhere = program("   2:  UFRAME[1]=PR[9] ;\n   3:L P[1] 100mm/sec FINE ;\n", position(1, kXyz));
+  EXPECT_TRUE(row_of(ls(elsewhere).program, "P[1]").corrected()) << "nothing here says PR[9]: the row does";
+}
+
+TEST(Fanuc, NegativeElementsStandInBrackets) {
+  const Program read = read_program(Dialect::kFanuc, {{"p.ls", with_frame("(-1500.25)")}},
+                                    {.frames = {{"UTOOL[2]", test::spindle_only().tools.at("spindle")}}});
+  ASSERT_EQ(read.targets.size(), 1u);
+  EXPECT_NEAR(read.frames[read.targets[0].frame].X_BO.translation().x(), -1.50025, 1e-12);
+}
+
+TEST(Fanuc, WhatIsSelectedOnAConditionOrForAnotherGroupIsToldApart) {
+  const auto said = [](const std::string& line) {
+    return why(ls(program("   2:  UTOOL_NUM=2 ;\n   3:  " + line + " ;\n   4:L P[1] 100mm/sec FINE ;\n",
+                          selected_position(1))),
+               "P[1]");
+  };
+  EXPECT_NE(said("IF (DI[1]=ON),UFRAME_NUM=(3)").find("a branch"), std::string::npos);
+  EXPECT_NE(said("UFRAME_NUM[GP1]=R[2]").find("is set at run time"), std::string::npos);
+  EXPECT_NE(said("JMP LBL[R[1]] ;\n   3:  LBL[1]").find("a branch, a jump"), std::string::npos);
+  EXPECT_NE(said("WAIT DI[1]=ON TIMEOUT,LBL[1] ;\n   3:  UFRAME_NUM=3 ;\n   3:  LBL[1]").find("a branch"),
+            std::string::npos);
+  for (const char* line : {"UFRAME_NUM[GP2]=3", "//UFRAME_NUM=3", "--eg:UFRAME_NUM=3", "UFRAME_NUM=(1)",
+                           "CALL_LOG('UFRAME_NUM=3, Offset')"})
+    EXPECT_EQ(said(line).find("UFRAME_NUM"), std::string::npos) << said(line);
+}
+
+TEST(Fanuc, WordsInCommentsOfPointsMeanNothingAndHideNothing) {
+  const test::Corrected made =
+      ls(program("   2:L P[1:don't] 100mm/sec FINE Offset,PR[1] ;\n   3:L P[2:Offset; Skip] 100mm/sec FINE ;\n"
+                 "   4:// L P[3] 100mm/sec FINE ;\n",
+                 position(1, kXyz) + position(2, kXyz) + position(3, kXyz)));
+  EXPECT_NE(why(made, "P[1]").find("Offset displaces it"), std::string::npos) << why(made, "P[1]");
+  EXPECT_TRUE(row_of(made.program, "P[2]").corrected()) << why(made, "P[2]");
+  EXPECT_EQ(made.program.moves_corrected, 1u);
+}
+
+TEST(Fanuc, AToolThatStandsIsLeft) {
+  const test::Corrected made = ls(program("   2:L P[1] 100mm/sec FINE RTCP ;\n", position(1, kXyz)));
+  EXPECT_NE(why(made, "P[1]").find("the tool stands"), std::string::npos) << why(made, "P[1]");
+}
+
+TEST(Fanuc, ASecondRobotInAPointIsNamed) {
+  const std::string two = position(1, kXyz).substr(0, position(1, kXyz).find("\n};")) +
+                          "\n   GP2:\n\tUF : 1, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n" + kXyz +
+                          ",\n\tW = 0 deg,\tP = 60 deg,\tR = 0 deg\n};\n";
+  const test::Corrected made = ls(program("   2:L P[1] 100mm/sec FINE ;\n", two));
+  EXPECT_NE(why(made, "P[1]").find("its group 2 is another robot"), std::string::npos) << why(made, "P[1]");
+}
+
+TEST(Fanuc, APointThatSaysNoFrameOrToolIsLeftWithWhatIsMissing) {
+  const auto without = [](const std::string& what) {
+    std::string text = position(1, kXyz);
+    text.erase(text.find(what), what.size());
+    return why(ls(program("   2:L P[1] 100mm/sec FINE ;\n", text)), "P[1]");
+  };
+  EXPECT_NE(without("UF : 1, ").find("the point does not say its UF"), std::string::npos) << without("UF : 1, ");
+  EXPECT_NE(without("UT : 2,").find("the point does not say its UT"), std::string::npos) << without("UT : 2,");
+}
+
 }  // namespace
 }  // namespace trammel::cam

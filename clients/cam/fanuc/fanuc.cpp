@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <set>
@@ -48,10 +49,16 @@ struct Selected {
   std::string follows;  ///< what moves the targets at run time, `Track TAST[1]`; or empty
   bool operator==(const Selected&) const = default;
 };
+/// `UFRAME[1]=PR[5]`
+struct Setting {
+  std::string from, where;
+  std::size_t file = 0;
+  std::string changed = {};  ///< why its value is not constant
+};
 /// What all programs of a controller share.
 struct Controller {
   std::map<std::string, Register> registers;
-  std::map<std::string, std::string> set_from, changed;  ///< of UFRAME[n] and UTOOL[n]
+  std::map<std::string, Setting> settings;  ///< of UFRAME[n] and UTOOL[n]
   struct Statements {
     std::string first;  ///< where
     int count = 0;
@@ -65,6 +72,53 @@ bool is_number(const std::string& text) {
 double number(const Piece& piece) {
   const auto written = read_number(piece.text);
   return written ? written->value : 0;
+}
+
+constexpr const char* kDecided = "a branch, a jump or a loop of the program decides it";
+
+/// `-12.5`, `(-12.5)`, up to the end of a statement.
+std::optional<double> constant_at(const Pieces& statement, std::size_t at) {
+  const bool in_brackets = at + 3 == statement.size() && statement[at].is("(") && statement[at + 2].is(")");
+  const std::size_t value = in_brackets ? at + 1 : at;
+  if (!in_brackets && at + 1 != statement.size()) return std::nullopt;
+  return statement[value].kind == Piece::Kind::kNumber ? std::optional<double>(number(statement[value])) : std::nullopt;
+}
+
+/// `IF (R[1]=1),PR[5,1]=(200)`: where what it may do begins; 0: the statement is no such one.
+std::size_t done_perhaps(const Pieces& statement) {
+  int depth = 0;
+  for (std::size_t at = 0; at + 1 < statement.size() && statement[0].is("IF"); ++at) {
+    if (statement[at].is("[") || statement[at].is("(")) ++depth;
+    if (statement[at].is("]") || statement[at].is(")")) --depth;
+    if (statement[at].is(",") && depth == 0) return at + 1;
+  }
+  return 0;
+}
+
+bool is_group(const Piece& piece) { return piece.text.size() == 3 && piece.text.starts_with("GP"); }
+
+/// Without comments of points and registers, `P[1:don't]`, and without texts: words in them mean nothing.
+Pieces without_comments(const Pieces& pieces) {
+  Pieces kept;
+  const auto skip_to = [&](std::size_t at, std::string_view end) {
+    std::size_t to = at + 1;
+    while (to < pieces.size() && !pieces[to].is(end)) ++to;
+    return to;
+  };
+  int depth = 0;
+  for (std::size_t at = 0; at < pieces.size(); ++at) {
+    if (depth > 0 && pieces[at].is(":") && !is_group(pieces[at - 1])) at = skip_to(at, "]");
+    if (depth == 0 && pieces[at].is("'")) {
+      const std::size_t end = skip_to(at, "'");
+      if (end < pieces.size()) at = end;
+      continue;
+    }
+    if (at >= pieces.size()) break;
+    if (pieces[at].is("[")) ++depth;
+    if (pieces[at].is("]")) --depth;
+    kept.push_back(pieces[at]);
+  }
+  return kept;
 }
 
 class File {
@@ -91,7 +145,9 @@ class File {
   void read_motions() {
     std::vector<Step> steps;
     for (const Pieces& statement : statements_) {
-      steps.push_back(step_of(statement));
+      const Step& step = steps.emplace_back(step_of(statement));
+      const bool jumps = step.kind == Step::Kind::kJump || step.kind == Step::Kind::kJumpMaybe;
+      jumps_anywhere_ |= jumps && !is_number(step.label);
       note_load(statement);
     }
     const std::vector<Selected> selected = states_before(
@@ -107,7 +163,11 @@ class File {
     const auto robot = position.groups.find(1);
     if (robot == position.groups.end()) return "it has no group 1";
     const Group& group = robot->second;
-    for (const auto& [number_of_group, other] : position.groups) note_external(number_of_group, other, target);
+    for (const auto& [number_of_group, other] : position.groups) {
+      if (number_of_group > 1 && other.values.contains("X"))
+        return fmt::format("its group {} is another robot", number_of_group);
+      note_external(number_of_group, other, target);
+    }
     const bool joints = group.values.contains("J1");
     if (joints && options_.keep_joints) return "joint targets are kept (--keep-joints)";
     target.coordinates = joints ? Coordinates::kJoints : Coordinates::kAnglesXyz;
@@ -203,7 +263,9 @@ class File {
       at = end;
       if (end < part.end && (last == std::string::npos || last < begin || text_[last] != ';')) continue;
       const std::size_t first = text_.find_first_not_of(" \t\r\n0123456789:", begin);
-      if (first < end && text_[first] != '!') add_statements(pieces_of(text_, begin, end, first_line, {"", "'\""}));
+      // Remarks: `!hole`, `--eg:hole`, and what is commented out, `//L P[1] ...`.
+      if (first < end && std::string_view("!-/").find(text_[first]) == std::string_view::npos)
+        add_statements(without_comments(pieces_of(text_, begin, end, first_line, {"", ""})));
       begin = end;
       first_line = line + 1;
     }
@@ -240,9 +302,11 @@ class File {
     if (statement.empty()) return {};
     const Piece& first = statement[0];
     if (first.is("LBL")) return {Kind::kLabel, indexed_number(statement, 0)};
-    for (std::size_t at = 0; at + 1 < statement.size(); ++at) {
-      if (statement[at].is("JMP") && statement[at + 1].is("LBL"))
-        return {at == 0 ? Kind::kJump : Kind::kJumpMaybe, indexed_number(statement, at + 1)};
+    // `JMP LBL[1]`, `IF R[1]=1,JMP LBL[2]`, `L P[1] 100mm/sec FINE Skip,LBL[3]`, `WAIT DI[1]=ON TIMEOUT,LBL[4]`
+    for (std::size_t at = 1; at < statement.size(); ++at) {
+      if (!statement[at].is("LBL")) continue;
+      const bool always = at == 1 && first.is("JMP");
+      return {always ? Kind::kJump : Kind::kJumpMaybe, indexed_number(statement, at)};
     }
     const bool block = statement.back().is("THEN");
     if (first.is("IF") && block) return {Kind::kIf};
@@ -273,19 +337,32 @@ class File {
       selected.frame = selected.tool =
           fmt::format("{} {} may select another one", statement[at].text, statement[at + 1].text);
     }
-    for (std::size_t at = 0; at + 2 < statement.size(); ++at) {
-      if (!statement[at + 1].is("=") || (!statement[at].is("UFRAME_NUM") && !statement[at].is("UTOOL_NUM"))) continue;
-      const bool constant = statement[at + 2].kind == Piece::Kind::kNumber && at + 3 == statement.size();
-      (statement[at].is("UFRAME_NUM") ? selected.frame : selected.tool) =
-          constant ? std::string(statement[at + 2].text)
-                   : fmt::format("{} is set at run time ({} line {})", statement[at].text, program_.files[index_].name,
-                                 statement[at].line);
+    if (statement[0].is("LBL") && jumps_anywhere_) selected.frame = selected.tool = kDecided;
+    select_number(statement, selected);
+  }
+
+  /// `UFRAME_NUM=1`, `UTOOL_NUM[GP1]=R[2]`, `IF (DI[1]),UFRAME_NUM=2`
+  void select_number(const Pieces& statement, Selected& selected) const {
+    const std::size_t at = done_perhaps(statement);
+    const bool frame = statement[at].is("UFRAME_NUM");
+    if (!frame && !statement[at].is("UTOOL_NUM")) return;
+    std::size_t equals = at + 1;
+    bool others = false, ours = false;
+    for (; equals < statement.size() && !statement[equals].is("="); ++equals) {
+      ours |= statement[equals].is("GP1");
+      others |= is_group(statement[equals]) && !statement[equals].is("GP1");
     }
+    if (equals >= statement.size() || (others && !ours)) return;
+    const std::optional<double> constant = constant_at(statement, equals + 1);
+    const std::string now = constant ? fmt::format("{:g}", *constant)
+                                     : fmt::format("{} is set at run time ({} line {})", statement[at].text,
+                                                   program_.files[index_].name, statement[at].line);
+    std::string& number = frame ? selected.frame : selected.tool;
+    number = at == 0 || number == now ? now : kDecided;
   }
   static void join(Selected& state, const Selected& other, const std::string&) {
-    const std::string why = "a branch, a jump or a loop of the program decides it";
-    if (state.frame != other.frame) state.frame = why;
-    if (state.tool != other.tool) state.tool = why;
+    if (state.frame != other.frame) state.frame = kDecided;
+    if (state.tool != other.tool) state.tool = kDecided;
     if (state.beside.empty()) state.beside = other.beside;
     if (state.follows.empty()) state.follows = other.follows;
   }
@@ -303,14 +380,21 @@ class File {
     }
   }
 
+  /// `PR[5]`, also of `PR[GP1:5]`; `PR[*]` where an index chooses it.
   static std::string indexed(const Pieces& pieces, std::size_t at) {
     if (at + 3 >= pieces.size() || !pieces[at + 1].is("[")) return "";
-    if (pieces[at + 2].kind != Piece::Kind::kNumber) return fmt::format("{}[*]", pieces[at].text);
-    return fmt::format("{}[{}]", pieces[at].text, pieces[at + 2].text);
+    const std::string_view word = pieces[at].text;
+    const bool grouped = at + 5 < pieces.size() && is_group(pieces[at + 2]) && pieces[at + 3].is(":");
+    if (grouped && !pieces[at + 2].is("GP1")) return fmt::format("{}[{}]", word, pieces[at + 2].text);
+    if (grouped) at += 2;
+    if (pieces[at + 2].kind != Piece::Kind::kNumber) return fmt::format("{}[*]", word);
+    return fmt::format("{}[{}]", word, pieces[at + 2].text);
   }
 
-  /// `UFRAME_NUM=1`, `UTOOL[2]=PR[5]`, `PR[5,1]=100`, `PR[5]=LPOS`, `P[1]=...`
-  void note_setting(const Pieces& statement) {
+  /// `UTOOL[2]=PR[5]`, `PR[5,1]=100`, `PR[5]=LPOS`, `P[1]=...`, also behind `IF (...),`
+  void note_setting(const Pieces& whole) {
+    const std::size_t begin = done_perhaps(whole);
+    const Pieces statement(whole.begin() + static_cast<std::ptrdiff_t>(begin), whole.end());
     if (statement.size() < 3) return;
     std::size_t equals = 0;
     while (equals < statement.size() && !statement[equals].is("=")) ++equals;
@@ -319,18 +403,20 @@ class File {
     const std::string name = indexed(statement, 0);
     const std::string where = fmt::format("{} line {}", program_.files[index_].name, statement[0].line);
     note_reading(statement, equals, name);
-    if (word == "PR" && !name.empty()) return note_register(statement, equals, name, where);
-    if ((word == "UFRAME" || word == "UTOOL") && !name.empty()) {
+    if (name.empty()) return;
+    const std::string why = fmt::format("{} is set at run time ({})", name, where);
+    if (word == "PR") {
+      note_register(statement, equals, name, where);
+      if (begin > 0) controller_.registers[name].changed = why;
+    } else if (word == "UFRAME" || word == "UTOOL") {
       const std::string from = indexed(statement, equals + 1);
-      const bool twice = !controller_.set_from.emplace(name, from).second;
-      if (twice && controller_.set_from[name] != from)
-        controller_.changed[name] = fmt::format("{} is set at run time ({})", name, where);
-    } else if (word == "P" && name.starts_with("P[")) {
+      Setting& set = controller_.settings.try_emplace(name, Setting{from, where, index_}).first->second;
+      if (set.from != from || begin > 0 || name.ends_with("[*]")) set.changed = why;
+    } else if (name.starts_with("P[")) {
       const auto position = by_name_.find(name);
-      const std::string why = fmt::format("{} is set at run time ({})", name, where);
       if (position != by_name_.end()) positions_[position->second].changed = why;
       if (name == "P[*]") {
-        for (auto& [begin, any] : positions_) any.changed = why;
+        for (auto& [at, any] : positions_) any.changed = why;
       }
     }
   }
@@ -351,82 +437,122 @@ class File {
   void note_register(const Pieces& statement, std::size_t equals, const std::string& name, const std::string& where) {
     Register& set = controller_.registers[name];
     const bool element = equals >= 5 && statement[3].is(",") && statement[4].kind == Piece::Kind::kNumber;
-    const bool constant = equals + 2 == statement.size() && statement[equals + 1].kind == Piece::Kind::kNumber;
+    const std::optional<double> now = constant_at(statement, equals + 1);
     const int index = element ? static_cast<int>(number(statement[4])) : 0;
-    if (!element || !constant || index < 1 || index > 6) {
+    if (!element || !now || index < 1 || index > 6) {
       set.changed = fmt::format("{} is set at run time ({})", name, where);
       return;
     }
     std::optional<double>& value = set.elements[static_cast<std::size_t>(index - 1)];
-    const double now = number(statement[equals + 1]);
-    if (value && *value != now) set.changed = fmt::format("{} is set several times ({})", name, where);
+    const auto took_it = [&](const auto& one) { return one.second.from == name && one.second.file == index_; };
+    if (!value && std::any_of(controller_.settings.begin(), controller_.settings.end(), took_it))
+      set.changed = fmt::format("{} is set behind where it is taken ({})", name, where);
+    if (value && *value != *now) set.changed = fmt::format("{} is set several times ({})", name, where);
     value = now;
   }
 
-  /// The value of UFRAME[n] or UTOOL[n]; else why it is not known.
-  std::optional<Pose> setting(const std::string& name, std::string& why) const {
-    const auto from = controller_.set_from.find(name);
-    if (from == controller_.set_from.end()) {
-      why = fmt::format("{} is not in the files handed over: --frames tells its value", name);
-      return std::nullopt;
-    }
-    if (const auto set = controller_.changed.find(name); set != controller_.changed.end()) {
-      why = set->second;
-      return std::nullopt;
-    }
-    const auto set = controller_.registers.find(from->second);
+  /// `UFRAME[R[1]]=PR[2]` sets any of them.
+  [[nodiscard]] const Setting* setting_of(const std::string& name) const {
+    const auto any = controller_.settings.find(name.substr(0, name.find('[')) + "[*]");
+    const auto own = controller_.settings.find(name);
+    if (any != controller_.settings.end()) return &any->second;
+    return own == controller_.settings.end() ? nullptr : &own->second;
+  }
+  [[nodiscard]] const Register* register_of(const std::string& name) const {
+    const auto any = controller_.registers.find("PR[*]");
+    const auto own = controller_.registers.find(name);
+    if (any != controller_.registers.end()) return &any->second;
+    return own == controller_.registers.end() ? nullptr : &own->second;
+  }
+
+  /// What the programs set UFRAME[n] or UTOOL[n] to, or why that is not known.
+  struct Told {
+    std::optional<Pose> X;
+    std::string why;
+    bool by_program = false;  ///< the programs decide the value, known or not
+    std::string where;
+  };
+  [[nodiscard]] Told setting(const std::string& name) const {
+    const Setting* set = setting_of(name);
+    if (set == nullptr)
+      return {{}, fmt::format("{} is not in the files handed over: --frames tells its value", name), false, ""};
+    if (!set->changed.empty()) return {{}, set->changed, true, ""};
+    const Register* from = register_of(set->from);
     std::vector<double> numbers;
-    for (std::size_t k = 0; set != controller_.registers.end() && set->second.changed.empty() && k < 6; ++k) {
-      if (set->second.elements[k]) numbers.push_back(*set->second.elements[k]);
+    for (std::size_t k = 0; from != nullptr && from->changed.empty() && k < 6; ++k) {
+      if (from->elements[k]) numbers.push_back(*from->elements[k]);
     }
-    if (numbers.size() == 6) return pose_of(Coordinates::kAnglesXyz, numbers);
-    why = fmt::format("{} comes from {}, whose value is not constant in the program", name, shown(from->second));
-    return std::nullopt;
+    if (numbers.size() == 6) return {pose_of(Coordinates::kAnglesXyz, numbers), "", true, set->where};
+    const std::string why =
+        fmt::format("{} comes from {}, whose value is not constant in the program", name, shown(set->from));
+    return {{}, why, from != nullptr, ""};
+  }
+
+  [[nodiscard]] static std::string why_not_by_row(const std::string& row, const Pose& X, const Told& told,
+                                                  const Pose& X_BW) {
+    if (!told.X) return told.by_program ? told.why : "";
+    return against_row(row, X, X_BW * *told.X, told.where);
+  }
+
+  std::size_t add_frame(ProgramFrame frame) {
+    for (std::size_t k = 0; k < program_.frames.size(); ++k) {
+      const ProgramFrame& known = program_.frames[k];
+      if (known.name == frame.name && known.why_not == frame.why_not && known.X_BO.isApprox(frame.X_BO, 1e-12))
+        return k;
+    }
+    program_.frames.push_back(std::move(frame));
+    return program_.frames.size() - 1;
+  }
+  std::size_t add_tool(ProgramTool tool) {
+    for (std::size_t k = 0; k < program_.tools.size(); ++k) {
+      if (same_tool_of_program(program_.tools[k], tool) && program_.tools[k].why_not == tool.why_not) return k;
+    }
+    program_.tools.push_back(std::move(tool));
+    return program_.tools.size() - 1;
   }
 
   std::size_t frame_of(const std::string& number_text) {
     ProgramFrame frame;
     frame.name = fmt::format("UFRAME[{}]", number_text);
-    if (number_text != "0" && !take_row(frame.name, options_, frame)) {
-      if (const auto X = setting(frame.name, frame.why_not)) frame.X_BO = *X;
+    if (number_text == "0") return add_frame(std::move(frame));
+    const Told told = setting(frame.name);
+    if (take_row(frame.name, options_, frame)) {
+      const auto stands = options_.frames.find(kRobotBase);
+      const Pose X_BW = stands == options_.frames.end() ? Pose::Identity() : stands->second.inverse();
+      frame.why_not = why_not_by_row(frame.name, frame.X_BO, told, X_BW);
+    } else if (told.X) {
+      frame.X_BO = *told.X;
+    } else {
+      frame.why_not = told.why;
     }
-    for (std::size_t k = 0; k < program_.frames.size(); ++k) {
-      if (program_.frames[k].name == frame.name && program_.frames[k].X_BO.isApprox(frame.X_BO, 1e-12)) return k;
-    }
-    program_.frames.push_back(std::move(frame));
-    return program_.frames.size() - 1;
+    return add_frame(std::move(frame));
   }
 
   std::size_t tool_of(const std::string& number_text) {
     ProgramTool tool;
     tool.name = fmt::format("UTOOL[{}]", number_text);
-    std::string why;
     if (number_text == "0") {
       tool.X_FT = Pose::Identity();
-    } else if (take_row(tool.name, options_, tool)) {
-      tool.rotation_rounding = from_deg(0.001);
-    } else if (const auto X = setting(tool.name, why)) {
-      tool.X_FT = *X;
+      return add_tool(std::move(tool));
+    }
+    const Told told = setting(tool.name);
+    if (take_row(tool.name, options_, tool)) {
+      tool.why_not = why_not_by_row(tool.name, *tool.X_FT, told, Pose::Identity());
+    } else if (told.X) {
+      tool.X_FT = *told.X;
       tool.file = program_.files[index_].name;
-      tool.rotation_rounding = from_deg(0.001);
+    } else if (told.by_program) {
+      tool.why_not = told.why;
     }
-    for (std::size_t k = 0; k < program_.tools.size(); ++k) {
-      if (program_.tools[k].name == tool.name && program_.tools[k].file == tool.file) return k;
-    }
-    program_.tools.push_back(std::move(tool));
-    return program_.tools.size() - 1;
+    if (tool.X_FT) tool.rotation_rounding = from_deg(0.001);
+    return add_tool(std::move(tool));
   }
 
   /// `UF : F` is the frame that is selected. Where another one is selected than the point has, the controller stops.
   std::size_t frame_of(const std::string& number_text, const std::string& selected) {
     const std::string why = why_not_there("UF", "UFRAME_NUM", number_text, selected);
     if (why.empty()) return frame_of(number_text == "F" ? selected : number_text);
-    ProgramFrame frame{fmt::format("UFRAME[{}]", number_text), Pose::Identity(), why};
-    for (std::size_t k = 0; k < program_.frames.size(); ++k) {
-      if (program_.frames[k].name == frame.name && program_.frames[k].why_not == frame.why_not) return k;
-    }
-    program_.frames.push_back(std::move(frame));
-    return program_.frames.size() - 1;
+    return add_frame({fmt::format("UFRAME[{}]", number_text), Pose::Identity(), why});
   }
   std::size_t tool_of(const std::string& number_text, const std::string& selected) {
     const std::string why = why_not_there("UT", "UTOOL_NUM", number_text, selected);
@@ -434,15 +560,12 @@ class File {
     ProgramTool tool;
     tool.name = fmt::format("UTOOL[{}]", number_text);
     tool.why_not = why;
-    for (std::size_t k = 0; k < program_.tools.size(); ++k) {
-      if (program_.tools[k].name == tool.name && program_.tools[k].why_not == tool.why_not) return k;
-    }
-    program_.tools.push_back(std::move(tool));
-    return program_.tools.size() - 1;
+    return add_tool(std::move(tool));
   }
   /// Of a point with its own number, beside what is selected where a motion goes to it; empty: they agree.
   static std::string why_not_there(const char* own, const char* word, const std::string& number_text,
                                    const std::string& selected) {
+    if (number_text.empty()) return fmt::format("the point does not say its {}", own);
     if (number_text != "F") {
       if (!is_number(number_text) || !is_number(selected) || number_text == selected) return "";
       return fmt::format("the point has {} : {}, and {} is {} there: the controller stops", own, number_text, word,
@@ -478,6 +601,7 @@ class File {
       if (piece.is("Offset") || piece.is("OFFSET") || piece.is("Tool_Offset") || piece.is("TOOL_OFFSET") ||
           piece.is("VOFFSET") || piece.is("INC"))
         why = fmt::format("{} displaces it at run time", piece.text);
+      if (piece.is("RTCP")) why = "the tool stands and the robot holds the work piece (RTCP)";
       if (piece.is("Skip") || piece.is("SKIP")) why = "a sensor may end the motion (Skip)";
     }
     for (std::size_t at = 1; at + 2 < statement.size(); ++at) {
@@ -517,9 +641,9 @@ class File {
       const Group& robot = group == position.groups.end() ? empty : group->second;
       const bool joint = statement[0].is("J");
       sites_.add(index_, begin, known,
-                 {tool_of(robot.tool.empty() ? "?" : robot.tool, with(selected.tool, selected.beside)),
-                  frame_of(robot.frame.empty() ? "?" : robot.frame, with(selected.frame, selected.beside)),
-                  std::string(statement[0].text), index_, statement[0].line, program_.moves.size() - 1, !joint});
+                 {tool_of(robot.tool, with(selected.tool, selected.beside)),
+                  frame_of(robot.frame, with(selected.frame, selected.beside)), std::string(statement[0].text), index_,
+                  statement[0].line, program_.moves.size() - 1, !joint});
       used_.insert(begin);
     }
     if (!any) leave(statement, name, fmt::format("{} is not in /POS", name));
@@ -575,7 +699,8 @@ class File {
   std::map<std::string, std::size_t> by_name_;
   std::vector<Pieces> statements_;
   std::string last_motion_;
-  int line_tracking_ = 0;  ///< the line that says so; 0: none does
+  bool jumps_anywhere_ = false;  ///< `JMP LBL[R[1]]`
+  int line_tracking_ = 0;        ///< the line that says so; 0: none does
   std::set<std::size_t> used_;
 };
 
