@@ -102,6 +102,8 @@ inline constexpr double kPathStep = 0.2;
 
 // Doubting: what makes a finding unsure once everything was found.
 
+/// Nat by which a size that changes with time or temperature must beat one that stays: odds of 3000 to 1.
+inline constexpr double kChangesSize = 8;
 /// Numbers of a cause of one joint above which it fits a part of many other causes.
 inline constexpr int kManyNumbers = 12;
 /// Times what is unexplained (rms): a pose that is out by less may be where that is largest.

@@ -138,7 +138,7 @@ namespace {
 
 /// The reasons for which a cause is doubted.
 struct Doubts {
-  bool by_surrogate, dwarfed, again, unlikely, slow, by_scale, not_held_out, by_half, is_part, by_many_numbers,
+  bool by_surrogate, dwarfed, again, unlikely, slow, by_scale, not_held_out, by_half, changes, is_part, by_many_numbers,
       at_one_point;
   std::vector<Cause> many;
 
@@ -151,6 +151,7 @@ struct Doubts {
         by_scale(may_be_scale(cause, beside)),
         not_held_out(!evidence.helps_held_out),
         by_half(beside.more_than_noise && !evidence.in_both_halves),
+        changes(evidence.changes),
         is_part(is_a_little_more(beside) && evidence.effect_rms <= beside.left),
         by_many_numbers(is_a_little_more(beside) && is_flexible(cause, evidence)),
         at_one_point(record_of(cause).part == causes::Part::kLinks && is_each_tool_at_one_place(beside.recorded)),
@@ -172,7 +173,7 @@ std::vector<Cause> Doubts::could_also_be(const Cause& cause, const std::vector<C
   all.insert(all.end(), many.begin(), many.end());
   if (again || slow) add(all, unknown_cause(cause.joint));
   if (unlikely) add_what_weighs(all);
-  if (not_held_out || by_half || is_part || by_many_numbers) add(all, unknown_cause(cause.joint));
+  if (not_held_out || by_half || changes || is_part || by_many_numbers) add(all, unknown_cause(cause.joint));
   return all;
 }
 
@@ -195,6 +196,9 @@ std::string Doubts::action(const Cause& cause, const Surrogates& surrogates) con
   if (by_half)
     return "measure again with other poses: half of these do not show it by themselves, and more than noise is left";
   if (not_held_out) return "measure again with other poses: those that are held out are not predicted better with it";
+  if (changes)
+    return "its size changed while the batch was measured, as that of this cause does not: " +
+           what_slow_changes_need(surrogates);
   if (is_part) return "find first what is unknown here: more is left beyond the stated noise than this";
   if (by_many_numbers)
     return "measure more poses: a cause of so many numbers fits a part of many others, and what is left is larger than "

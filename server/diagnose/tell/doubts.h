@@ -26,6 +26,7 @@ struct Evidence {
   bool helps_held_out = true;  ///< poses held out are predicted better with it
   bool unlikely = false;       ///< it is larger than robots have it
   int numbers = 1;             ///< that it has
+  bool changes = false;        ///< its size changed while the batch was measured
 };
 
 /// How sure the name of a finding is, and what people do about it.

@@ -167,6 +167,8 @@ class Findings {
   /// the columns `others` free.
   [[nodiscard]] bool is_in_both_halves(const Accepted& one, const VectorXd& effect,
                                        const std::vector<Index>& others) const;
+  /// Whether `one`, which does `effect` and always acts, did so more at some times or temperatures than at others.
+  [[nodiscard]] bool changes_size(const Accepted& one, const VectorXd& effect) const;
   /// The family of `one`; null where it does not begin at a pose.
   [[nodiscard]] const Family* step_family(const Accepted& one) const;
 
@@ -274,9 +276,12 @@ Finding Findings::cause(const Accepted& one) const {
   const ErrorFigures before = figures_of(problem_.positions(without));
   const ErrorFigures after = figures_of(problem_.positions(held_out_));
   const OwnEstimate own = own_estimate(problem_, one.in_model, estimated_.change, estimated_.covariance);
-  const Evidence evidence{effect_rms, !beside_.more_than_noise || is_in_both_halves(one, effect, others),
-                          held_out_.squaredNorm() < without.squaredNorm(), is_unlikely(one.cause, own.size),
-                          static_cast<int>(own.size.size())};
+  const Evidence evidence{effect_rms,
+                          !beside_.more_than_noise || is_in_both_halves(one, effect, others),
+                          held_out_.squaredNorm() < without.squaredNorm(),
+                          is_unlikely(one.cause, own.size),
+                          static_cast<int>(own.size.size()),
+                          changes_size(one, effect)};
   Judgement judgement = judge(one.cause, evidence, one.could_also_be, beside_);
   return {.cause = cause,
           .source = one.source,
@@ -313,6 +318,28 @@ bool Findings::is_in_both_halves(const Accepted& one, const VectorXd& effect, co
     if (log_evidence(along.squaredNorm(), freedom) - one.penalty < limit_) return false;
   }
   return true;
+}
+
+bool Findings::changes_size(const Accepted& one, const VectorXd& effect) const {
+  const CauseRecord& record = record_of(one.cause);
+  if (record.lasting != causes::Lasting::kAlways || record.scope != causes::Scope::kJoint) return false;
+  const auto& poses = problem_.batch().measurements;
+  VectorXd time = VectorXd::LinSpaced(problem_.poses(), -1, 1);
+  VectorXd temperature = VectorXd::Zero(problem_.poses());
+  for (Index i = 0; i < problem_.poses() && !surrogates_.temperature; ++i)
+    temperature(i) = poses[static_cast<std::size_t>(i)].context.temperature.value_or(0);
+  const Background all(columns_);
+  const VectorXd left = all.project(problem_.residual());
+  const auto evidence_of = [&](VectorXd course) {
+    course.array() -= course.mean();
+    if (!(course.norm() > 0)) return 0.0;
+    VectorXd more = effect;
+    for (Index i = 0; i < problem_.poses(); ++i)
+      more.segment(problem_.first_row(i), problem_.row_count(i)) *= course(i) / course.cwiseAbs().maxCoeff();
+    const double own = more.dot(VectorXd(all.project(more)));
+    return own > 0 ? log_evidence(std::pow(more.dot(left), 2) / own, 1) : 0;
+  };
+  return std::max(evidence_of(time), evidence_of(temperature)) > thresholds::kChangesSize;
 }
 
 const Family* Findings::step_family(const Accepted& one) const {

@@ -38,6 +38,30 @@ TEST(ToolThatSags, GoesWithItsAttitudeAndIsNoRunOutOfAWristAxis) {
   }
 }
 
+TEST(CausesThatGrow, AnEncoderWhoseErrorComesWithTheDayIsNotSure) {
+  const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
+  const auto found_with = [&](double at_first) {
+    MeasurementBatch batch = test::measured(robot, 120, 5);
+    for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
+      Measurement& m = batch.measurements[i];
+      m.context.time = 30.0 * static_cast<double>(i);
+      const double share = static_cast<double>(i) / static_cast<double>(batch.measurements.size());
+      ArmState arm = robot.truth.state(m.context);
+      const Pose still = ArmKinematics(arm).tool_pose_W();
+      arm.add_to_joint(2, 3e-4 * (at_first + (1 - at_first) * 2 * share) * std::cos(m.context.q(2)));
+      const Pose moved = ArmKinematics(arm).tool_pose_W() * still.inverse();
+      m.p_W = moved * m.p_W;
+      m.R_WT = moved.linear() * *m.R_WT;
+    }
+    return diagnosed(batch);
+  };
+  const Diagnosis grows = found_with(0);
+  EXPECT_TRUE(std::none_of(grows.findings.begin(), grows.findings.end(), is_sure)) << grows.sentence;
+  const Diagnosis stays = found_with(1);
+  EXPECT_FALSE(stays.findings.empty()) << stays.sentence;
+  EXPECT_EQ(stays.sentence.find("its size changed"), std::string::npos) << stays.sentence;
+}
+
 /// The virtual robot with something that no cause of the list makes, and that grows fast with the arm's reach.
 MeasurementBatch stretched(std::uint64_t seed) {
   const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
