@@ -45,7 +45,16 @@ std::string contradiction(const Configuration& said, const JointVector& q) {
     joints.push_back(fmt::format("joint {} at {:.1f} deg and not at {:.0f} to {:.0f} deg", j + 1, to_deg(value),
                                  to_deg(*said.near[j] - kPi / 4), to_deg(*said.near[j] + kPi / 4)));
   }
+  for (std::size_t j = 0; j < said.signs.size(); ++j) {
+    const double value = q(static_cast<Eigen::Index>(j));
+    const bool open = j < 3 || std::abs(q(4)) > kOpen;
+    if (!said.signs[j] || !open || std::abs(value) <= kOpen || (value < 0) == (*said.signs[j] < 0)) continue;
+    joints.push_back(fmt::format("joint {} is at {:.1f} deg", j + 1, to_deg(value)));
+  }
   if (joints.empty()) return "";
+  if (!said.conf)
+    return fmt::format("its status and turn contradict each other, or what reaches the pose: {}",
+                       fmt::join(joints, ", "));
   return fmt::format("its configuration contradicts itself: branch {} has {}; the branch is followed", *said.conf,
                      fmt::join(joints, ", "));
 }

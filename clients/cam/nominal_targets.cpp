@@ -28,6 +28,9 @@ constexpr double kSameJoints = 1e-6;  // rad
 constexpr const char* kNotSaid =
     "the controller takes the joints nearest to those before, and the program does not say these";
 
+constexpr const char* kOtherStatus =
+    "its status and turn are of another posture than the motion before leaves, and a line keeps that one";
+
 class Finding {
  public:
   Finding(const Program& program, const ArmOfProgram& arm, const CellTools& cell, std::vector<ToolChoice> tools)
@@ -43,8 +46,11 @@ class Finding {
     const auto doubts = std::count_if(found_.targets.begin(), found_.targets.end(),
                                       [](const NominalTarget& target) { return !target.doubt.empty(); });
     if (doubts > 0)
-      found_.notes.push_back(fmt::format(
-          "{} targets: what the program says of the configuration contradicts itself; the branch is followed", doubts));
+      found_.notes.push_back(
+          fmt::format("{} targets: what the program says of the configuration contradicts itself, or the motion "
+                      "before; the receipt "
+                      "says what is followed",
+                      doubts));
     return std::move(found_);
   }
 
@@ -171,7 +177,12 @@ class Finding {
       const bool enough = stand.q && (!stand.posture_only || on_a_line);
       if (!enough && !program_.targets[t].configuration.said()) return leave_open(t, kNotSaid);
       if (!enough) note_as_said(t);
+      const std::optional<JointVector> said = enough ? as_said(t, stand.q).q : std::nullopt;
       take(t, enough ? arm_.nearest(flange_of(t), program_.targets[t].external, *stand.q, on_a_line) : as_said(t, {}));
+      // Branches by number are placeholders where lines pass over them; status and turns are what was stored.
+      const Configuration& stored = program_.targets[t].configuration;
+      if (stored.said() && !stored.conf && said && target.q && !same_posture(*said, *target.q))
+        target.doubt = kOtherStatus;
       if (!was.q || !target.q) continue;
       if (!same_posture(*was.q, *target.q)) return leave_open(t, "motions come to it in different postures");
       target = was;

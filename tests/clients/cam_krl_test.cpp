@@ -370,5 +370,65 @@ TEST(Krl, AMotionToWhereTheAxesAreHasNoTarget) {
   EXPECT_EQ(krl(program("LIN $POS_ACT\n")).program.left_alone(), 1u) << "it depends on the tool";
 }
 
+TEST(Krl, WhatARoutineIsHandedIsNothingOfADataListAndMayBeSetByIt) {
+  const std::string dat = "DEFDAT p PUBLIC\nDECL E6POS XP1={X 300,Y 0,Z 500,A 0,B 60,C 0,S 2,T 2}\nENDDAT\n";
+  const std::string by_value = "DEF go(XP1:IN)\nLIN XP1\nEND\n";
+  EXPECT_NE(why(krl(program("go({X 310,Y 0,Z 500,A 0,B 60,C 0})\n") + by_value, dat), "XP1").find("is a parameter"),
+            std::string::npos);
+  const auto handed = [&](const std::string& call, const std::string& routine) {
+    return why(krl(program(call + "\nLIN XP1\n") + routine, dat), "XP1");
+  };
+  const std::string sets = "DEF shift(P:OUT)\nP.Z=P.Z+10\nEND\n";
+  EXPECT_NE(handed("shift(XP1)", sets).find("XP1 may be set by SHIFT (p.src line 6)"), std::string::npos)
+      << handed("shift(XP1)", sets);
+  EXPECT_NE(handed("ELSEWHERE(3,XP1)", "").find("may be set by ELSEWHERE"), std::string::npos);
+  EXPECT_NE(handed("n=measure(XP1)", "DEFFCT INT measure(P)\nRETURN 1\nENDFCT\n").find("may be set by"),
+            std::string::npos);
+  for (const char* call : {"show(XP1)", "$IN_A=INV_POS(XP1)", "BAS(#PTP_PARAMS,100)", "ELSEWHERE(XP1:XP1)"})
+    EXPECT_EQ(handed(call, "DEF show(P:IN)\nEND\n").find("may be set"), std::string::npos) << call;
+}
+
+TEST(Krl, AToolThatAnIndexMayChangeIsNotConstant) {
+  const test::Corrected tool = krl(program("TOOL_DATA[i]={X 0,Y 0,Z 1,A 0,B 0,C 0}\nLIN " + kPoint + "\n"));
+  EXPECT_NE(why(tool, kPoint).find("is set at run time (p.src line 6)"), std::string::npos) << why(tool, kPoint);
+  const test::Corrected load = krl(program("LOAD_DATA[1].M=5\nLIN " + kPoint + "\n"));
+  EXPECT_NE(fmt::format("{}", fmt::join(load.program.notes, "\n")).find("is set at run time (p.src line 6)"),
+            std::string::npos);
+}
+
+TEST(Krl, WhatInitmovSetsIsNotTheToolAndBaseOfBefore) {
+  const test::Corrected made = krl(program("BAS(#INITMOV,0)\nLIN " + kPoint + "\n"));
+  EXPECT_NE(why(made, kPoint).find("BAS(#INITMOV) sets it to its default (p.src line 6)"), std::string::npos)
+      << why(made, kPoint);
+  EXPECT_TRUE(row_of(krl(program("BAS(#INITMOV,0)\n" + kSet + "LIN " + kPoint + "\n")).program, kPoint).corrected());
+}
+
+TEST(Krl, ARowOfFramesThatContradictsTheFilesLeavesThePointWithBothValues) {
+  const auto with = [](const std::string& row, double x) {
+    Pose X = row.starts_with("TOOL") ? test::spindle_only().tools.at("spindle")
+                                     : make_pose(Matrix3::Identity(), {1.5, 0, .5});
+    X.translation().x() += x;
+    return krl(program("LIN " + kPoint + "\n"), "", {.frames = {{row, X}}});
+  };
+  for (const char* row : {"TOOL_DATA[1]", "BASE_DATA[2]"}) {
+    EXPECT_TRUE(row_of(with(row, 0).program, kPoint).corrected()) << why(with(row, 0), kPoint);
+    const std::string said = why(with(row, 0.0025), kPoint);
+    for (const char* part : {row, "by --frames and [", "by $config.dat line", "2.500 mm"})
+      EXPECT_NE(said.find(part), std::string::npos) << said;
+  }
+}
+
+TEST(Krl, AUnitThatIsNoneCarriesNoBase) {
+  const auto with = [](const std::string& type) {
+    return krl(
+        program("BAS(#BASE,2)\nLIN " + kPoint + "\n"),
+        "DEFDAT p\nMACH_DEF_INDEX[2]=3\nMACHINE_DEF[3]={NAME[] \" \",COOP_KRC_INDEX 0,PARENT[] \" \",ROOT {X 0.0,Y "
+        "0.0,Z 0.0,A 0.0,B 0.0,C 0.0},MECH_TYPE " +
+            type + ",GEOMETRY[] \" \"}\nENDDAT\n");
+  };
+  EXPECT_TRUE(row_of(with("#NONE").program, kPoint).corrected()) << why(with("#NONE"), kPoint);
+  EXPECT_NE(why(with("#EASYS"), kPoint).find("external kinematics carry base 2"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace trammel::cam

@@ -261,5 +261,55 @@ TEST(Posture, WhatATargetOfKrlDoesNotSayFollowsFromTheMotionBeforeWhereverThatTa
   }
 }
 
+/// Targets of a KRL program with a tool 200 mm long, in the order of the program's targets, and the notes.
+NominalTargets of_krl(const std::string& lines, std::size_t count) {
+  const std::string config = "DEFDAT $CONFIG\nTOOL_DATA[1]={X 0,Y 0,Z 200,A 0,B 0,C 0}\nENDDAT\n";
+  const std::string src = "DEF p( )\n$TOOL=TOOL_DATA[1]\n$BASE=$NULLFRAME\n" + lines + "END\n";
+  const Chain chain = read_robot(TRAMMEL_SOURCE_DIR "/models/kuka_kr210-r2700-extra.yaml").value();
+  const Program program = read_program(Dialect::kKrl, {{"p.src", src}, {"$config.dat", config}}, {});
+  Pose X_FT = Pose::Identity();
+  X_FT.translation().z() = 0.2;
+  NominalTargets made = nominal_targets(program, ArmOfProgram(chain), {{{"tool", X_FT}}, {}}, "", "").value();
+  EXPECT_EQ(made.targets.size(), count) << lines;
+  return made;
+}
+// With joint 5 above zero, and joint 4 with it.
+const std::string kWristUp = "PTP {X 1500,Y 200,Z 900,A 0,B 90,C 0,S 2,T 35}\n";
+const std::string kNext = "{X 1500,Y 200,Z 800,A 0,B 90,C 0";
+
+TEST(Posture, WhatFollowsAMotionThatIsLeftIsLeftUnlessItSaysItsOwnPosture) {
+  for (const char* between :
+       {"PTP XP[i]\n", "PTP_REL {A1 90}\n", "PTP XHOME\n", "IF $IN[1] THEN\nPTP XHOME\nENDIF\n"}) {
+    const std::string begin = kWristUp + between;
+    const NominalTargets open = of_krl(begin + "LIN " + kNext + "}\n", 2);
+    EXPECT_NE(open.targets.back().why_not.find("the program does not say these"), std::string::npos) << between;
+    EXPECT_TRUE(of_krl(begin + "LIN " + kNext + ",S 2,T 35}\n", 2).targets.back().q) << between;
+    EXPECT_TRUE(of_krl(begin + "PTP " + kNext + ",S 2,T 35}\nLIN {X 1500,Y 200,Z 700,A 0,B 90,C 0}\n", 3).targets[2].q);
+  }
+  EXPECT_TRUE(of_krl(kWristUp + "LIN_REL {Z 50}\nLIN $POS_ACT\nLIN " + kNext + "}\n", 2).targets.back().q)
+      << "lines keep the posture, wherever they end";
+  EXPECT_TRUE(of_krl("PTP {A1 0,A2 -90,A3 90,A4 0,A5 45,A6 0}\nLIN " + kNext + "}\n", 2).targets.back().q);
+}
+
+TEST(Posture, ALineOfKrlKeepsThePostureWhateverItsStatusSays) {
+  for (const char* motion : {"LIN ", "SLIN "}) {
+    const NominalTargets made = of_krl(kWristUp + motion + kNext + ",S 6,T 27}\n", 2);
+    ASSERT_TRUE(made.targets[0].q && made.targets[1].q) << motion;
+    EXPECT_GT((*made.targets[0].q)(4), 0);
+    EXPECT_GT((*made.targets[1].q)(4), 0) << motion;
+    EXPECT_NE(made.targets[1].doubt.find("another posture than the motion before"), std::string::npos) << motion;
+    EXPECT_EQ(made.targets[0].doubt, "");
+  }
+  const NominalTargets free = of_krl(kWristUp + "PTP " + kNext + ",S 6,T 27}\n", 2);
+  ASSERT_TRUE(free.targets[1].q);
+  EXPECT_LT((*free.targets[1].q)(4), 0) << "a motion of the axes goes where they say";
+}
+
+TEST(Posture, AStatusThatItsTurnContradictsIsToldAtTheTarget) {
+  const NominalTargets made = of_krl("PTP {X 1500,Y 200,Z 900,A 0,B 90,C 0,S 2,T 2}\n", 1);
+  ASSERT_TRUE(made.targets[0].q);
+  EXPECT_NE(made.targets[0].doubt.find("joint 1 is at -"), std::string::npos) << made.targets[0].doubt;
+}
+
 }  // namespace
 }  // namespace trammel::cam

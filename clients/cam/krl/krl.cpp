@@ -93,6 +93,7 @@ class Reader {
 
   Program read() {
     for (std::size_t f = 0; f < program_.files.size(); ++f) collect(f);
+    note_handed_over();
     names_.join_globals();
     find_base();
     find_numbers();
@@ -108,6 +109,7 @@ class Reader {
     }
     for (std::size_t f = 0; f < lines_.size(); ++f) note_readings(f);
     sites_.finish(program_, [this](const Site& site, ProgramTarget& target) { return describe(site, target); });
+    find_order();
     list_unused();
     return std::move(program_);
   }
@@ -138,6 +140,7 @@ class Reader {
         if (!any) mark.at = k + 1 < lines.size() ? lines[k + 1].begin : mark.at;
         any = true;
         if (tokens[first].text == "DEFDAT") continue;
+        names_.note_parameters(f, k, name + 1);
         routines_.push_back({tokens[name].text, f, k + 1, lines.size()});
         open = static_cast<int>(routines_.size()) - 1;
       } else if (!tokens.empty() && (tokens[0].text == "END" || tokens[0].text == "ENDFCT") && open >= 0) {
@@ -149,6 +152,56 @@ class Reader {
     }
     if (!any) routines_.push_back({"", f, 0, lines.size()});
     program_.mark_places.push_back(mark);
+  }
+
+  /// `shift(XP2)`: a routine of these files that takes it without `:IN`, or one of others, may set it.
+  void note_handed_over() {
+    for (std::size_t f = 0; f < lines_.size(); ++f) {
+      for (std::size_t k = 0; k < lines_[f].size(); ++k) {
+        const std::vector<Token>& tokens = lines_[f][k].tokens;
+        for (std::size_t at = 0; at + 1 < tokens.size(); ++at) {
+          const bool calls = tokens[at].kind == TokenKind::kWord && tokens[at + 1].text == "(";
+          if (calls && !declares(tokens)) note_handed_over(f, k, at);
+        }
+      }
+    }
+  }
+  /// `DEF shift(p:IN)`, `EXT shift(E6POS:IN)`
+  static bool declares(const std::vector<Token>& tokens) {
+    static const std::set<std::string> kWords = {"DEF", "DEFFCT", "EXT", "EXTFCT"};
+    const std::size_t first = tokens.size() > 1 && tokens[0].text == "GLOBAL" ? 1 : 0;
+    return kWords.contains(tokens[first].text);
+  }
+  void note_handed_over(std::size_t f, std::size_t k, std::size_t at) {
+    const std::vector<Token>& tokens = lines_[f][k].tokens;
+    const std::string& name = tokens[at].text;
+    const auto routine =
+        std::find_if(routines_.begin(), routines_.end(), [&](const Routine& one) { return one.name == name; });
+    // Functions of the controller in expressions take values; so does BAS( ).
+    if (routine == routines_.end() && (at > 0 || name == "BAS")) return;
+    std::size_t argument = 0;
+    int depth = 0;
+    for (std::size_t t = at + 1; t + 1 < tokens.size(); ++t) {
+      if (tokens[t].text == "(" || tokens[t].text == "[" || tokens[t].text == "{") ++depth;
+      if (tokens[t].text == ")" || tokens[t].text == "]" || tokens[t].text == "}") --depth;
+      if (depth == 0) return;
+      if (depth != 1) continue;
+      if (tokens[t].text == ",") ++argument;
+      if (tokens[t].text != "(" && tokens[t].text != ",") continue;
+      const bool by_value = routine != routines_.end() && takes_value(*routine, argument);
+      if (!by_value && tokens[t + 1].kind == TokenKind::kWord) names_.note_handed_over(f, k, t + 1, tokens[at].text);
+    }
+  }
+  /// Whether the parameter of that number is `:IN`.
+  [[nodiscard]] bool takes_value(const Routine& routine, std::size_t number) const {
+    if (routine.first == 0) return true;
+    const std::vector<Token>& tokens = lines_[routine.file][routine.first - 1].tokens;
+    std::size_t parameter = 0;
+    for (std::size_t t = 0; t + 1 < tokens.size(); ++t) {
+      if (tokens[t].text == ",") ++parameter;
+      if (tokens[t].text == ":" && parameter == number) return tokens[t + 1].text == "IN";
+    }
+    return false;
   }
 
   /// The controller's own `bas.src`: BAS( ) means the same with it among the files as without.
@@ -269,19 +322,28 @@ class Reader {
     ProgramTool tool;
     const auto named = tool_names_.find(std::to_string(number));
     tool.name = named == tool_names_.end() ? data : named->second;
-    const Variable* variable = names_.find(data, f);
-    if (!take_row(data, options_, tool) && variable != nullptr) {
-      if (!variable->changed.empty())
-        tool.why_not = variable->changed;
-      else if (!variable->values.empty())
-        fill(variable->values[0], tool);
-    }
-    if (const Variable* load = names_.find(fmt::format("LOAD_DATA[{}]", number), f);
-        load != nullptr && !load->values.empty()) {
-      tool.load = load_of(load->values[0].operands);
-      tool.load_note = note_on_default(tool.load, load->values[0]);
+    const bool by_row = take_row(data, options_, tool);
+    const Told<const Assigned*> value = names_.value_of(data, f);
+    if (value && by_row)
+      tool.why_not = against_row(data, *tool.X_FT, names_.frame_of((*value)->operands, (*value)->file), **value);
+    else if (value)
+      fill(**value, tool);
+    else if (names_.is_set(data, f))
+      tool.why_not = value.error();
+    const std::string load = fmt::format("LOAD_DATA[{}]", number);
+    if (const Told<const Assigned*> stated = names_.value_of(load, f)) {
+      tool.load = load_of((*stated)->operands);
+      tool.load_note = note_on_default(tool.load, **stated);
+    } else if (names_.is_set(load, f)) {
+      tool.load_note = fmt::format("{}: it is not compared with the cell's", stated.error());
     }
     return add_tool(std::move(tool));
+  }
+
+  /// Why a row of --frames cannot hold beside the value of the files; empty: it can.
+  [[nodiscard]] std::string against_row(const std::string& row, const Pose& X, const Told<Pose>& by_files,
+                                        const Assigned& at) const {
+    return by_files ? cam::against_row(row, X, *by_files, names_.place(at.file, at.line)) : by_files.error();
   }
 
   void fill(const Assigned& assigned, ProgramTool& tool) const {
@@ -394,9 +456,17 @@ class Reader {
     const Variable* unit = names_.find(fmt::format("MACH_DEF_INDEX[{}]", number), f);
     if (unit == nullptr || unit->values.empty() || unit->values[0].operands.size() != 1) return "";
     const Assigned& at = unit->values[0];
-    if (at.operands[0].kind == Value::Kind::kNumber && at.operands[0].number <= 0) return "";
+    if (at.operands[0].kind == Value::Kind::kNumber && (at.operands[0].number <= 0 || carries_nothing(at, f)))
+      return "";
     return fmt::format("external kinematics carry base {} (MACH_DEF_INDEX, {})", number,
                        names_.place(at.file, at.line));
+  }
+
+  /// `MACHINE_DEF[3]={NAME[] "",...,MECH_TYPE #NONE}`: there is no such unit.
+  [[nodiscard]] bool carries_nothing(const Assigned& index, std::size_t f) const {
+    const Told<const Assigned*> unit = names_.value_of(fmt::format("MACHINE_DEF[{:g}]", index.operands[0].number), f);
+    const Value* type = unit && (*unit)->operands.size() == 1 ? (*unit)->operands[0].field("MECH_TYPE") : nullptr;
+    return type != nullptr && upper(program_.files[(*unit)->file].text.substr(type->begin, 5)) == "#NONE";
   }
 
   /// `$BASE = ...`
@@ -404,8 +474,16 @@ class Reader {
     ProgramFrame frame;
     frame.name = operands.size() == 1 && operands[0].kind == Value::Kind::kName ? operands[0].name : "$BASE";
     const bool numbered = frame.name.starts_with("BASE_DATA[") && frame.name.find('*') == std::string::npos;
-    if (numbered && take_row(frame.name, options_, frame)) return add_frame(std::move(frame));
-    const Told<Pose> X_WO = names_.frame_of(operands, f);
+    Told<Pose> X_WO = names_.frame_of(operands, f);
+    if (numbered && take_row(frame.name, options_, frame)) {
+      // Rows are seen from the robot's base.
+      if (X_WO) X_WO = names_.robroot().inverse() * *X_WO;
+      if (const Told<const Assigned*> value = names_.value_of(frame.name, f))
+        frame.why_not = against_row(frame.name, frame.X_BO, X_WO, **value);
+      else if (names_.is_set(frame.name, f))
+        frame.why_not = fmt::format("base {}: {}", shown(frame.name), value.error());
+      return add_frame(std::move(frame));
+    }
     if (X_WO) frame.X_BO = *X_WO;
     if (!X_WO) frame.why_not = fmt::format("base {}: {}", shown(frame.name), X_WO.error());
     return add_frame(std::move(frame));
@@ -643,7 +721,11 @@ class Reader {
     } else if (tokens[3].text == "CP_PARAMS" || tokens[3].text == "VEL_CP") {
       state.speed = speed_of(tokens, 5);
     } else if (tokens[3].text == "INITMOV") {
+      const std::string may = fmt::format("BAS(#INITMOV) sets it to its default ({})", names_.place(f, k));
       state.speed = kSpeedUnknown;
+      state.load = 0;
+      state.tool = add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, "$TOOL: " + may});
+      state.frame = add_frame({"$BASE", Pose::Identity(), "$BASE: " + may});
     } else if (tokens[3].text == "EX_BASE") {
       state.frame = add_frame({"$BASE", Pose::Identity(), carried_at(f, k)});
     } else if (tokens[3].text == "BASE") {
@@ -760,12 +842,17 @@ class Reader {
                       lines_[f][k].tokens[0].text.find("PTP") == std::string::npos};
     if (operands.size() > 1 || operands[0].kind == Value::Kind::kAggregate) {
       places_[{f, operands[0].begin}] = {f, k, operands};
+      note_axes(operands[0], move);
       return sites_.add(f, operands[0].begin, name, use);
     }
     if (operands[0].kind != Value::Kind::kName) return leave(f, k, name, "an expression decides it");
     const std::string& wanted = operands[0].name;
     if (wanted.starts_with("$")) return leave(f, k, name, fmt::format("{} decides it", shown(wanted)));
-    if (wanted.find("[*]") == std::string::npos) return use_named(f, k, wanted, name, use);
+    if (wanted.find("[*]") == std::string::npos) {
+      const Told<const Assigned*> one = names_.value_of(wanted, f);
+      if (one && (*one)->operands.size() == 1) note_axes((*one)->operands[0], move);
+      return use_named(f, k, wanted, name, use);
+    }
     const std::string beginning = wanted.substr(0, wanted.find("[*]") + 1);
     bool any = false;
     for (const auto& [key, variable] : names_.all()) {
@@ -777,6 +864,10 @@ class Reader {
     if (!any) leave(f, k, name, "an index chooses it, and its elements are not in the files");
   }
 
+  void note_axes(const Value& value, std::size_t move) {
+    if (const Told<std::vector<double>> axes = krl::Variables::numbers_of(value, kAxes)) axes_[move] = *axes;
+  }
+
   void use_named(std::size_t f, std::size_t k, const std::string& wanted, const std::string& name, const SiteUse& use) {
     const Told<const Assigned*> assigned = names_.value_of(wanted, f);
     if (!assigned) return leave(f, k, name, assigned.error());
@@ -784,6 +875,44 @@ class Reader {
     if (at.operands.empty()) return leave(f, k, name, "it is not constant");
     places_[{at.file, at.operands[0].begin}] = at;
     sites_.add(at.file, at.operands[0].begin, name, use);
+  }
+
+  // Which motions may be the last before each.
+
+  /// Lines, arcs, and motions to positions without a status keep the posture of the motion before.
+  void find_order() {
+    std::vector<Step> steps;
+    std::map<std::size_t, std::pair<std::size_t, std::size_t>> moves;  // file and line, by step
+    for (const Routine& routine : routines_) {
+      steps.push_back({Step::Kind::kRoutine, std::to_string(&routine - routines_.data())});
+      for (std::size_t k = routine.first; k < routine.last; ++k) {
+        const std::vector<Token>& tokens = lines_[routine.file][k].tokens;
+        for (const std::size_t called : called_by(tokens)) steps.push_back({Step::Kind::kCall, std::to_string(called)});
+        if (moves_.contains({routine.file, k})) moves.emplace(steps.size(), std::pair(routine.file, k));
+        steps.push_back(step_of(tokens));
+      }
+      steps.push_back({Step::Kind::kEnd});
+    }
+    const auto before = motions_before(flow_of(steps), [&](std::size_t step) -> std::optional<std::size_t> {
+      const auto move = moves.find(step);
+      return move == moves.end() ? std::nullopt : std::optional<std::size_t>(moves_.at(move->second));
+    });
+    for (const auto& [step, place] : moves) follow(place.first, place.second, before[step]);
+    for (const auto& [move, axes] : axes_) {
+      if (program_.moves[move].targets.empty()) program_.moves[move].axes = axes;
+    }
+  }
+
+  /// Where the program begins, or an interrupt ends what it came in, what a target does not say is taken to be nearest
+  /// to zero.
+  void follow(std::size_t f, std::size_t k, const std::set<std::size_t>& before) {
+    ProgramMove& move = program_.moves[moves_.at({f, k})];
+    const bool by_axes = lines_[f][k].tokens[0].text.find("PTP") != std::string::npos;
+    const bool says = std::any_of(move.targets.begin(), move.targets.end(),
+                                  [&](std::size_t t) { return program_.targets[t].configuration.said(); });
+    if (resumes_ || before.contains(kNoMotion) || (by_axes && (says || move.targets.empty()))) return;
+    move.choice = JointChoice::kOnALine;
+    move.before = before;
   }
 
   // Targets.
@@ -997,6 +1126,7 @@ class Reader {
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> moves_;
   std::map<std::pair<std::size_t, std::size_t>, Assigned> places_;
   std::set<std::tuple<std::size_t, int, std::string>> left_;
+  std::map<std::size_t, std::vector<double>> axes_;  ///< deg, that motions command
   Sites sites_;
 };
 

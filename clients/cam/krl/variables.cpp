@@ -93,6 +93,29 @@ void Variables::note_value(std::size_t f, std::size_t k, std::size_t at) {
   if (variable.values.size() > 1) variable.changed = set_at(root, f, k);
 }
 
+void Variables::note_parameters(std::size_t f, std::size_t k, std::size_t at) {
+  const std::vector<Token>& tokens = lines_[f][k].tokens;
+  for (; at + 1 < tokens.size(); ++at) {
+    if ((tokens[at].text != "(" && tokens[at].text != ",") || tokens[at + 1].kind != TokenKind::kWord) continue;
+    const std::string& name = tokens[at + 1].text;
+    declared_[name].insert(stem_of(files_[f].name));
+    variables_[{stem_of(files_[f].name), name}].changed =
+        fmt::format("{} is a parameter ({})", shown(spelled(name, f, k)), place(f, k));
+  }
+}
+
+void Variables::note_handed_over(std::size_t f, std::size_t k, std::size_t at, const std::string& to) {
+  const std::vector<Token>& tokens = lines_[f][k].tokens;
+  std::size_t end = at;
+  const std::vector<Value> name = operands_at(tokens, at, &end);
+  const bool alone = end < tokens.size() && (tokens[end].text == "," || tokens[end].text == ")");
+  if (!alone || name.size() != 1 || name[0].kind != Value::Kind::kName) return;
+  const std::string root = root_of(name[0].name);
+  std::string& changed = variables_[{stem_of(files_[f].name), root}].changed;
+  if (changed.empty())
+    changed = fmt::format("{} may be set by {} ({})", shown(spelled(root, f, k)), shown(to), place(f, k));
+}
+
 void Variables::join_globals() {
   static const std::set<std::string> kOfTheController = {"TOOL_DATA", "BASE_DATA", "LOAD_DATA"};
   for (auto one = variables_.begin(); one != variables_.end();) {
@@ -148,13 +171,21 @@ const Variable* Variables::find(const std::string& name, std::size_t f) const {
   return nullptr;
 }
 
+const Variable* Variables::any_changed(const std::string& name, std::size_t f) const {
+  const std::size_t index = name.find('[');
+  const Variable* any = index == std::string::npos ? nullptr : find(name.substr(0, index) + "[*]", f);
+  return any == nullptr || any->changed.empty() ? nullptr : any;
+}
+
+bool Variables::is_set(const std::string& name, std::size_t f) const {
+  return any_changed(name, f) != nullptr || find(root_of(name), f) != nullptr;
+}
+
 Told<const Assigned*> Variables::value_of(const std::string& name, std::size_t f) const {
+  // One element of an array is changed where any may be.
+  if (const Variable* any = any_changed(name, f)) return because(any->changed);
   const Variable* variable = find(root_of(name), f);
   if (variable == nullptr) return because(fmt::format("{} is not in the files handed over", shown(name)));
-  // One element of an array is changed where any may be.
-  const std::string any = name.substr(0, name.find('[')) + "[*]";
-  const Variable* all = name.find('[') == std::string::npos ? nullptr : find(any, f);
-  if (all != nullptr && !all->changed.empty()) return because(all->changed);
   if (!variable->changed.empty()) return because(variable->changed);
   if (variable->values.empty()) return because(fmt::format("{} has no value in the files", shown(name)));
   return &variable->values[0];

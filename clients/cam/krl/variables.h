@@ -51,6 +51,10 @@ class Variables {
 
   /// A declaration or assignment: behind `DECL` and a type, or bare.
   void note_value(std::size_t f, std::size_t k);
+  /// `(p:IN,q:OUT)`, from a token on: what a routine calls so is nothing of a data list.
+  void note_parameters(std::size_t f, std::size_t k, std::size_t at);
+  /// A name that stands alone between brackets or commas of a call, which may set it.
+  void note_handed_over(std::size_t f, std::size_t k, std::size_t at, const std::string& to);
   /// What a file sets and does not declare is another one's, or the controller's.
   void join_globals();
   [[nodiscard]] std::string place(std::size_t f, std::size_t k) const;
@@ -58,11 +62,14 @@ class Variables {
   [[nodiscard]] std::string spelled(const std::string& name, std::size_t f, std::size_t k) const;
   /// The variable of a file's own data list, else of any.
   [[nodiscard]] const Variable* find(const std::string& name, std::size_t f) const;
+  /// Whether a file gives it a value, constant or not.
+  [[nodiscard]] bool is_set(const std::string& name, std::size_t f) const;
   /// The only value of a name.
   [[nodiscard]] Told<const Assigned*> value_of(const std::string& name, std::size_t f) const;
   [[nodiscard]] Told<Pose> frame_of(const std::vector<Value>& operands, std::size_t f, int depth = 0) const;
   /// What `$ROBROOT` stands for: the robot's base, seen from `$WORLD`.
   void set_robroot(const Pose& X_WB) { X_WB_ = X_WB; }
+  [[nodiscard]] const Pose& robroot() const { return X_WB_; }
   [[nodiscard]] static Told<std::vector<double>> numbers_of(const Value& value,
                                                             const std::array<const char*, 6>& fields);
   /// By file and name.
@@ -71,6 +78,8 @@ class Variables {
  private:
   void note_value(std::size_t f, std::size_t k, std::size_t at);
   void merge(const Variable& from, const std::string& root, Variable& into) const;
+  /// Where any element of its array is changed; null: nowhere.
+  [[nodiscard]] const Variable* any_changed(const std::string& name, std::size_t f) const;
   [[nodiscard]] std::string set_at(const std::string& name, std::size_t f, std::size_t k) const;
   [[nodiscard]] Told<Pose> frame_of(const Value& value, std::size_t f, int depth) const;
 
