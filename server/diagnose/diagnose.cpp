@@ -38,10 +38,20 @@ struct Placed {
   [[nodiscard]] const std::vector<SessionSetting>& sessions() const { return calibration.sessions; }
 };
 
+/// The cell's sources, and the frames that the cell does not say: a base that was stood by these very poses is free
+/// beside whatever else explains them.
+std::vector<std::string> with_unknown_frames(const Cell& cell) {
+  constexpr const char* kBase = "base";
+  std::vector<std::string> sources = with_unknown_tool(cell.model.error_sources, cell);
+  const bool is_listed = std::find(sources.begin(), sources.end(), kBase) != sources.end();
+  if (!cell.X_WB && !is_listed) sources.insert(sources.begin(), kBase);
+  return sources;
+}
+
 /// The cell's sources, and play of every joint that was approached from both sides: sessions that came from different
 /// sides differ by it, and nothing changed between them.
 std::vector<std::string> sources_with_play(const Cell& cell, const MeasurementBatch& batch) {
-  std::vector<std::string> sources = spelled_out(with_unknown_tool(cell.model.error_sources, cell), cell);
+  std::vector<std::string> sources = spelled_out(with_unknown_frames(cell), cell);
   for (const std::string& source : candidate_sources(cell, batch, nullptr)) {
     const bool is_play = cause_spelled(source).search == causes::SearchFamily::kPlay;
     if (is_play && std::find(sources.begin(), sources.end(), source) == sources.end()) sources.push_back(source);
@@ -82,7 +92,7 @@ bool is_beside_the_search(const Change& change) { return is_of_one_session(chang
 /// The cell's sources, and from each session on a tracker that was set up anew: nothing that this explains is evidence.
 /// So is what the search could not name of what changed between the sessions.
 std::vector<std::string> sources_of(const Cell& cell, const Placed& placed) {
-  std::vector<std::string> sources = with_unknown_tool(cell.model.error_sources, cell);
+  std::vector<std::string> sources = with_unknown_frames(cell);
   for (std::size_t s = 1; s < placed.sessions().size(); ++s)
     sources.push_back(fmt::format("{}@{}", set_up_anew().spelling, placed.sessions()[s].first + 1));
   for (const Change& change : placed.changes) {

@@ -10,6 +10,7 @@
 #include "server/robot/inverse_kinematics.h"
 #include "server/simulate/simulate.h"
 #include "tests/support/demand.h"
+#include "tests/support/one_point.h"
 #include "tests/support/temporary_folder.h"
 
 // What the whole list explains, link geometry included, is not unknown.
@@ -110,6 +111,20 @@ TEST(WholeList, AboutOnePointBaseToolAndZerosAreNotToldApartAndOtherPosesAreGive
   EXPECT_TRUE(std::any_of(told.limits.begin(), told.limits.end(), [](const std::string& limit) {
     return limit.find("measured at one point") != std::string::npos;
   }));
+}
+
+TEST(WholeList, AboutOnePointAToolThatIsOffIsTheToolWhereNobodySaidWhereTheRobotStands) {
+  const auto cell = test::cell_of_one_point("null", test::kToolOfOnePoint, "{error_sources: [], bias: none}");
+  const Pose X_WB = Eigen::Translation3d(0.4, -0.2, 0.1) * Eigen::AngleAxisd(0.7, Vector3::UnitZ());
+  const MeasurementBatch batch = test::one_point(*cell, Vector3(4e-3, -3e-3, 6e-3), X_WB, 30, 3);
+  DiagnoseOptions quick;
+  quick.draws = 200;
+  quick.recovery = false;
+  quick.next_poses = 0;
+  const Diagnosis told = test::demand(diagnose(cell, test::demand(check_against_cell(batch, *cell)), quick));
+  ASSERT_EQ(told.findings.size(), 1U) << told.sentence;
+  EXPECT_EQ(told.findings.front().cause, Cause{"tool"}) << told.sentence;
+  EXPECT_TRUE(told.findings.front().could_also_be.empty()) << told.sentence;
 }
 
 TEST(WholeList, AWristCouplingTooLargeForADerivativeIsFound) {
