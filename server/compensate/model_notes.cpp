@@ -237,6 +237,24 @@ void add_left_over(const CompensatedModel::Parts& parts, std::vector<Note>& note
                    times, to_mm(worst.left), to_mm(worst.stated))});
 }
 
+/// What the physics leaves is the most that the instrument's own error can be. Where more is stated, an error of the
+/// arm is taken for the instrument's.
+void add_overstated(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
+  constexpr double kOverstated = 0.5;  // of the stated sigma
+  constexpr double kFreedom = 60;      // known to a tenth
+  const double freedom = 3.0 * parts.training.poses - parts.rank;
+  if (freedom < kFreedom) return;
+  const double stated = parts.physics.cell->tracker.sigma;
+  const double left = parts.training.calibrated.rms * std::sqrt(parts.training.poses / freedom);
+  if (!(left < kOverstated * stated)) return;
+  notes.push_back(
+      {"sigma_overstated", Severity::kWarning,
+       fmt::format("{:.3f} mm an axis is left at the training poses, and a sigma of {:.3f} mm is stated: what "
+                   "the arm errs may be taken for the instrument's error, and is not promised; state the "
+                   "instrument's own sigma (tracker: sigma_mm) and train again",
+                   to_mm(left), to_mm(stated))});
+}
+
 /// The drawing knows no number of the batch, so nothing can make its errors small.
 void add_computed_positions(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   const Evaluation& training = parts.training;
@@ -366,6 +384,7 @@ std::vector<Note> notes_of(const CompensatedModel& model) {
   add_what_data_added(model.parts(), notes);
   add_idle_sources(model.parts(), notes);
   add_left_over(model.parts(), notes);
+  add_overstated(model.parts(), notes);
   add_computed_positions(model.parts(), notes);
   add_suspects(model.parts(), notes);
   add_untold_turn(model.parts(), notes);

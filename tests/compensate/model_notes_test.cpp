@@ -113,6 +113,21 @@ TEST(ModelNotes, WhatIsLeftIsHeldAgainstTheStatedSigma) {
   EXPECT_EQ(left(31).front().severity, Note::Severity::kStop);
 }
 
+TEST(ModelNotes, AStatedSigmaOfMoreThanTwiceWhatIsLeftIsSaidToHideTheArmsErrors) {
+  const auto overstated = [](double times, int poses) {
+    CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
+    parts.training.poses = poses;
+    parts.rank = 30;
+    const double fitted = 1 - parts.rank / (3.0 * poses);
+    parts.training.calibrated.rms = times * std::sqrt(3.0 * fitted) * parts.physics.cell->tracker.sigma;
+    const std::vector<Note> notes = notes_of(test::demand(CompensatedModel::make(parts)));
+    return std::any_of(notes.begin(), notes.end(), [](const Note& note) { return note.code == "sigma_overstated"; });
+  };
+  EXPECT_TRUE(overstated(0.48, 60));
+  EXPECT_FALSE(overstated(0.52, 60));
+  EXPECT_FALSE(overstated(0.3, 25)) << "what is left of few is little in any case";
+}
+
 TEST(ModelNotes, WhatIsLeftOfDistancesAndTouchesIsHeldAgainstTheStatedSigma) {
   const auto left = [](double times) {
     CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
