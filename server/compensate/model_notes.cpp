@@ -242,11 +242,14 @@ void add_left_over(const CompensatedModel::Parts& parts, std::vector<Note>& note
 void add_overstated(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   constexpr double kOverstated = 0.5;  // of the stated sigma
   constexpr double kFreedom = 60;      // known to a tenth
+  constexpr double kAll = 0.995;
   const double freedom = 3.0 * parts.training.poses - parts.rank;
   if (freedom < kFreedom) return;
   const double stated = parts.physics.cell->tracker.sigma;
   const double left = parts.training.calibrated.rms * std::sqrt(parts.training.poses / freedom);
-  if (!(left < kOverstated * stated)) return;
+  // Rows that are means of repeats, or state a sigma of their own, have a smaller one, and do not all lie within it.
+  const bool all_inside = parts.training.coverage_95_stated.value_or(0) > kAll;
+  if (!all_inside || !(left < kOverstated * stated)) return;
   notes.push_back(
       {"sigma_overstated", Severity::kWarning,
        fmt::format("{:.3f} mm an axis is left at the training poses, and a sigma of {:.3f} mm is stated: what "

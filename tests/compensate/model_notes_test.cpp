@@ -114,10 +114,11 @@ TEST(ModelNotes, WhatIsLeftIsHeldAgainstTheStatedSigma) {
 }
 
 TEST(ModelNotes, AStatedSigmaOfMoreThanTwiceWhatIsLeftIsSaidToHideTheArmsErrors) {
-  const auto overstated = [](double times, int poses) {
+  const auto overstated = [](double times, int poses, double inside = 1) {
     CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
     parts.training.poses = poses;
     parts.rank = 30;
+    parts.training.coverage_95_stated = inside;
     const double fitted = 1 - parts.rank / (3.0 * poses);
     parts.training.calibrated.rms = times * std::sqrt(3.0 * fitted) * parts.physics.cell->tracker.sigma;
     const std::vector<Note> notes = notes_of(test::demand(CompensatedModel::make(parts)));
@@ -125,6 +126,7 @@ TEST(ModelNotes, AStatedSigmaOfMoreThanTwiceWhatIsLeftIsSaidToHideTheArmsErrors)
   };
   EXPECT_TRUE(overstated(0.48, 60));
   EXPECT_FALSE(overstated(0.52, 60));
+  EXPECT_FALSE(overstated(0.48, 60, 0.95)) << "rows that state a sigma of their own";
   EXPECT_FALSE(overstated(0.3, 25)) << "what is left of few is little in any case";
 }
 
