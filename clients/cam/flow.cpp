@@ -111,6 +111,9 @@ class Order {
         return enter(s);
       case Kind::kCase:
       case Kind::kElse:
+        // Nothing leads to the first but the head of its block.
+        if (in_[s] != kNone && kind_of(in_[s]) == Kind::kSwitch && blocks_[in_[s]].branches.front() == s)
+          return add(s, s + 1);
         return add(s, in_[s] == kNone ? s + 1 : blocks_[in_[s]].end);
       case Kind::kEnd:
         return leave(s);

@@ -95,6 +95,10 @@ class Finding {
       if (carries_robot(program_, axis)) seen.insert(0);
       if (axis >= rails && seen.size() > 1) moving_axes_.insert(axis);
     }
+    // These move beneath every target, whichever axes it states.
+    for (const int axis : program_.moved_axes) {
+      if (axis >= rails) moving_axes_.insert(axis);
+    }
   }
 
   /// Where a motion leaves the arm.
@@ -218,8 +222,8 @@ class Finding {
     NominalTarget& found = found_.targets[t];
     found.why_not = choice.why_not;
     if (!found.why_not.empty()) return false;
-    for (const auto& [axis, value] : target.external) {
-      if (!moving_axes_.contains(axis)) continue;
+    for (const int axis : moving_axes_) {
+      if (!target.external.contains(axis) && !program_.moved_axes.contains(axis)) continue;
       found.why_not = fmt::format(
           "{0} {1}, and the cell has none; --idle-axis '{0}' says that it carries neither robot nor part",
           axis_called(program_, axis), carries_robot(program_, axis) ? "is not at zero throughout" : "moves");

@@ -236,6 +236,7 @@ Status take_idle_axes(Program& program, const std::vector<std::string>& names) {
   for (const ProgramTarget& target : program.targets) {
     for (const auto& [axis, value] : target.external) known.emplace(axis_called(program, axis), axis);
   }
+  for (const int axis : program.moved_axes) known.emplace(axis_called(program, axis), axis);
   for (const std::string& name : names) {
     const auto axis = known.find(name);
     if (axis == known.end()) {
@@ -246,6 +247,7 @@ Status take_idle_axes(Program& program, const std::vector<std::string>& names) {
           .with_text(name)
           .next(all.empty() ? "its targets have no external axes" : fmt::format("it has {}", fmt::join(all, ", ")));
     }
+    program.moved_axes.erase(axis->second);
     for (ProgramTarget& target : program.targets) target.external.erase(axis->second);
   }
   return {};

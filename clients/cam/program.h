@@ -226,6 +226,7 @@ struct Program : StatedRobot {
   std::vector<LeftAlone> left;
   std::vector<ProgramMove> moves;
   std::vector<Reading> readings;
+  std::set<int> moved_axes;        ///< external axes that motions move without a target
   std::vector<std::string> notes;  ///< what could not be compared, a sentence each
   std::vector<Cut> cuts;
 

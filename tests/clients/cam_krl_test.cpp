@@ -430,5 +430,34 @@ TEST(Krl, AUnitThatIsNoneCarriesNoBase) {
   EXPECT_NE(why(with("#EASYS"), kPoint).find("external kinematics carry base 2"), std::string::npos);
 }
 
+TEST(Krl, AnExternalAxisThatMovesWithoutATargetMovesBeneathAll) {
+  for (const char* motion : {"PTP {E1 90}", "ASYPTP {E1 90}", "PTP_REL {E1 90}", "LIN_REL {X 5,Y 0,Z 0,E1 90}"}) {
+    const test::Corrected made = krl(program("LIN " + kPoint + "\n" + motion + "\nLIN " + kMore + "\n"));
+    EXPECT_NE(why(made, kPoint).find("external axis a moves"), std::string::npos) << motion << why(made, kPoint);
+    EXPECT_NE(why(made, kMore).find("external axis a moves"), std::string::npos) << motion;
+    Program read = read_program(Dialect::kKrl, {{"p.src", program("LIN " + kPoint + "\n" + motion + "\n")}}, {});
+    ASSERT_TRUE(take_idle_axes(read, {"external axis a"})) << motion;
+    EXPECT_TRUE(read.moved_axes.empty());
+  }
+  EXPECT_TRUE(row_of(krl(program("PTP {A1 10}\nLIN " + kPoint + "\n")).program, kPoint).corrected());
+}
+
+TEST(Krl, FdatThatTheProgramMakesItselfIsNotGuessed) {
+  for (const char* line : {"FDAT_ACT.BASE_NO=2", "FDAT_ACT={TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE}"}) {
+    const test::Corrected made = krl(program(std::string(line) + "\nBAS(#FRAMES)\nLIN " + kPoint + "\n"));
+    EXPECT_NE(why(made, kPoint).find("FDAT_ACT is set by itself (p.src line 6)"), std::string::npos) << line;
+  }
+}
+
+TEST(Krl, ABaseThatEachBranchOfASwitchSetsAlikeIsKnown) {
+  const auto with = [](const std::string& first) {
+    return krl(program("$BASE=$NULLFRAME\nSWITCH n\n; hole\nCASE 1\n" + first +
+                       "\nDEFAULT\n$BASE=BASE_DATA[2]\nENDSWITCH\nLIN " + kPoint + "\n"));
+  };
+  EXPECT_TRUE(row_of(with("$BASE=BASE_DATA[2]").program, kPoint).corrected())
+      << why(with("$BASE=BASE_DATA[2]"), kPoint);
+  EXPECT_NE(why(with("n=2"), kPoint).find("a branch"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace trammel::cam

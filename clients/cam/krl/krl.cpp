@@ -148,6 +148,7 @@ class Reader {
         open = -1;
       } else {
         names_.note_value(f, k);
+        note_moved_axes(tokens);
       }
     }
     if (!any) routines_.push_back({"", f, 0, lines.size()});
@@ -202,6 +203,19 @@ class Reader {
       if (tokens[t].text == ":" && parameter == number) return tokens[t + 1].text == "IN";
     }
     return false;
+  }
+
+  /// `PTP {E1 90}`, `ASYPTP {E1 90}`: an external axis moves, and no target says it.
+  void note_moved_axes(const std::vector<Token>& tokens) {
+    if (tokens.empty() || !(is_motion(tokens[0].text) || is_relative(tokens[0].text) || tokens[0].text == "ASYPTP"))
+      return;
+    std::size_t end = 0;
+    const std::vector<Value> target = krl::operands_at(tokens, 1, &end);
+    if (target.size() != 1 || target[0].kind != Value::Kind::kAggregate) return;
+    const bool whole = target[0].field("X") != nullptr || target[0].field("A1") != nullptr;
+    for (int axis = 0; axis < 6 && (!whole || is_relative(tokens[0].text)); ++axis) {
+      if (target[0].field(fmt::format("E{}", axis + 1)) != nullptr) program_.moved_axes.insert(axis);
+    }
   }
 
   /// The controller's own `bas.src`: BAS( ) means the same with it among the files as without.
@@ -675,6 +689,10 @@ class Reader {
       state.fixed_tool = why_fixed(tokens, 2);
     } else if (word == "FDAT_ACT" && assigns && tokens[2].kind == TokenKind::kWord) {
       apply_fdat(tokens[2].text, f, state);
+    } else if (word == "FDAT_ACT" && tokens.size() > 1) {
+      const std::string why = fmt::format("FDAT_ACT is set by itself ({})", names_.place(f, k));
+      state.tool = add_tool({"$TOOL", "", 0, std::nullopt, std::nullopt, 0, "$TOOL: " + why});
+      state.frame = add_frame({"$BASE", Pose::Identity(), "$BASE: " + why});
     } else if (word == "BAS" && tokens.size() >= 6 && tokens[2].text == "#") {
       set_by_bas(tokens, f, k, state);
     } else if (word == "$VEL") {
