@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
 
 namespace trammel::wire {
 namespace {
@@ -10,33 +11,76 @@ bool is_everybody(Bytes prefix) {
   return std::all_of(prefix.begin(), prefix.end(), [](unsigned char octet) { return octet == 0; });
 }
 
-/// The writer of the only HEARTBEAT of a message that holds nothing else and is for no participant in particular.
-std::optional<std::uint32_t> writer_of_lone_heartbeat(Bytes message) {
+/// The only submessage of a message that says or asks something, and whom it is for.
+struct Lone {
+  Submessage submessage;
+  Bytes to{};  // prefix; empty: everybody
+};
+std::optional<Lone> lone_submessage(Bytes message) {
   if (message.size() < kHeader) return std::nullopt;
-  std::optional<std::uint32_t> writer;
-  Bytes rest = message.subspan(kHeader);
+  std::optional<Lone> lone;
+  Bytes to, rest = message.subspan(kHeader);
   while (const auto submessage = next_submessage(rest)) {
-    Reader body(submessage->body, submessage->little_endian());
     if (submessage->id == kInfoTimestamp || submessage->id == kStatistics) continue;
-    if (submessage->id == kInfoDestination && is_everybody(submessage->body)) continue;
-    if (submessage->id != kHeartbeat || writer) return std::nullopt;
-    static_cast<void>(body.entity());  // the reader
-    writer = body.entity();
+    if (submessage->id == kInfoDestination && submessage->body.size() >= kPrefix) {
+      to = is_everybody(submessage->body) ? Bytes() : submessage->body.first(kPrefix);
+      continue;
+    }
+    if (lone) return std::nullopt;
+    lone = Lone{*submessage, to};
   }
-  return writer;
+  return lone;
+}
+
+/// The writer of a HEARTBEAT.
+std::optional<std::uint32_t> writer_of_heartbeat(const Submessage& submessage) {
+  Reader body(submessage.body, submessage.little_endian());
+  static_cast<void>(body.entity());  // the reader
+  return body.entity();
+}
+
+/// The two of an ACKNACK that confirms nothing and asks for no number.
+std::optional<std::uint32_t> ends_of_first_question(const Submessage& submessage) {
+  Reader body(submessage.body, submessage.little_endian());
+  const auto reader = body.entity(), writer = body.entity();
+  const auto base = body.sequence_number();
+  const auto bits = body.u32();
+  if (!reader || !writer || base != 0 || bits != 0u) return std::nullopt;
+  return *reader * 0x9e3779b1u ^ *writer;
 }
 
 }  // namespace
 
 bool HeartbeatPace::lets_out(Bytes message, Time now) {
-  const auto writer = writer_of_lone_heartbeat(message);
-  const auto known = writer ? std::find(kWriters.begin(), kWriters.end(), *writer) : kWriters.end();
+  const auto lone = lone_submessage(message);
+  if (!lone) return true;
+  if (lone->submessage.id == kHeartbeat && lone->to.empty()) {
+    const auto writer = writer_of_heartbeat(lone->submessage);
+    return !writer || lets_heartbeat_out(*writer, now);
+  }
+  if (lone->submessage.id != kAckNack || lone->to.empty()) return true;
+  const auto ends = ends_of_first_question(lone->submessage);
+  return !ends || lets_question_out(key_of(lone->to, *ends), now);
+}
+
+bool HeartbeatPace::lets_heartbeat_out(std::uint32_t writer, Time now) {
+  const auto known = std::find(kWriters.begin(), kWriters.end(), writer);
   if (known == kWriters.end()) return true;
   std::atomic<Time::rep>& last = last_[static_cast<std::size_t>(known - kWriters.begin())];
   Time::rep before = last.load();
   const Time::rep at = now.time_since_epoch().count();
   if (before != 0 && Time::duration(at - before) < kBetween) return false;
   return last.compare_exchange_strong(before, at);
+}
+
+bool HeartbeatPace::lets_question_out(const EndpointKey& asked, Time now) {
+  const MutexLock lock(mutex_);
+  Questions& before = questions_.at(asked, now);
+  const bool is_first = now - std::exchange(before.asked, now) > kNewSeries;
+  if (!is_first && now - before.last < before.last - before.first + kBetweenQuestions) return false;
+  before.last = now;
+  if (is_first) before.first = now;
+  return true;
 }
 
 }  // namespace trammel::wire

@@ -3,9 +3,12 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 
+#include "idl/guard/recent_table.h"
 #include "idl/guard/rtps_bytes.h"
+#include "server/base/mutex.h"
 
 namespace trammel::wire {
 
@@ -13,21 +16,36 @@ namespace trammel::wire {
 /// it sends a HEARTBEAT to all participants, as long as one of them (a client that was killed, say) has not confirmed
 /// everything. Everybody answers each. With 30 participants, clients that come and go cost 100,000 packets a second,
 /// and the lock that every reply needs. One HEARTBEAT of a writer within kBetween says the same; while anything is
-/// unconfirmed the library repeats it by itself. Thread-safe.
+/// unconfirmed the library repeats it by itself.
+///
+/// And thins what the library asks of a writer that has not offered anything yet: a thousand times a second, until the
+/// writer offers something or its lease is over. Each question leaves when the time since the first has doubled.
+/// Thread-safe.
 class HeartbeatPace {
  public:
   using Time = std::chrono::steady_clock::time_point;
-  static constexpr std::chrono::milliseconds kBetween{20};
+  static constexpr std::chrono::milliseconds kBetween{20}, kBetweenQuestions{2}, kNewSeries{1000};
 
   /// Whether a message of our own is to leave. False only for one that holds nothing but a HEARTBEAT of discovery to
-  /// everybody, soon after another of the same writer.
+  /// everybody, soon after another of the same writer, or nothing but a question for the first sample of a writer.
   [[nodiscard]] bool lets_out(Bytes message, Time now = std::chrono::steady_clock::now());
 
  private:
   static constexpr std::uint32_t kPublications = 0x000003c2, kSubscriptions = 0x000004c2;  // writers of endpoints
   static constexpr std::array<std::uint32_t, 2> kWriters{kPublications, kSubscriptions};
 
+  struct Questions {
+    Time first{}, last{};  // that left
+    Time asked{};          // the last one, whether it left or not
+  };
+  static constexpr std::size_t kAskedWriters = 512;  // times eight
+
+  [[nodiscard]] bool lets_heartbeat_out(std::uint32_t writer, Time now);
+  [[nodiscard]] bool lets_question_out(const EndpointKey& asked, Time now);
+
   std::array<std::atomic<Time::rep>, kWriters.size()> last_{};
+  Mutex mutex_;
+  RecentTable<Questions, kAskedWriters> questions_ TRAMMEL_GUARDED_BY(mutex_);  // by writer and reader
 };
 
 }  // namespace trammel::wire

@@ -50,6 +50,25 @@ TEST(HeartbeatPace, WhatIsForOneParticipantLeavesAtOnce) {
   }
 }
 
+TEST(HeartbeatPace, AWriterThatOffersNothingIsAskedMoreAndMoreSeldom) {
+  HeartbeatPace pace;
+  const auto question = [](const Prefix& of, std::uint32_t writer) {
+    return Packet(kSelf).to(of).acknack(kUserReader, writer, 0, 0, 1).bytes();
+  };
+  int left = 0;
+  for (int ms = 0; ms < 10'000; ++ms) {
+    left += pace.lets_out(question(kOther, kUserWriter), kStart + milliseconds(ms)) ? 1 : 0;
+  }
+  EXPECT_LE(left, 15);
+  EXPECT_GE(left, 10);
+  const auto now = kStart + milliseconds(10'000);
+  EXPECT_TRUE(pace.lets_out(question(kOther, kUserWriter), now + milliseconds(1500))) << "it is met again";
+  EXPECT_TRUE(pace.lets_out(question(kSelf, kUserWriter), now)) << "a writer of the same name elsewhere";
+  EXPECT_TRUE(pace.lets_out(question(kOther, kUserWriter + 0x100), now));
+  EXPECT_TRUE(pace.lets_out(Packet(kSelf).to(kOther).acknack(kUserReader, kUserWriter, 1, 0, 1).bytes(), now));
+  EXPECT_TRUE(pace.lets_out(Packet(kSelf).to(kOther).acknack(kUserReader, kUserWriter, 0, 8, 1).bytes(), now));
+}
+
 TEST(HeartbeatPace, WhatHoldsDataOrIsOfAnotherWriterLeavesAtOnce) {
   HeartbeatPace pace;
   for (int i = 0; i < 3; ++i) {
