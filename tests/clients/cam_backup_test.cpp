@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "clients/cam/backup/backup.h"
+#include "clients/cam/stated_robot.h"
 #include "clients/cli/files/program_files.h"
 #include "tests/support/shifting_model.h"
 #include "tests/support/temporary_folder.h"
@@ -103,6 +104,37 @@ TEST_F(BackupAsProgram, AnotherRobotThanTheCellsIsRefusedByTypeAndByAxes) {
   EXPECT_NE(corrected().refusal.find("ROB1_360_1_1130"), std::string::npos);
   write_parameters(robot("1", "", "4400_60_1.96"));
   EXPECT_NE(corrected().refusal.find("ROB1_4400_60_1.96"), std::string::npos) << "six axes, a parallel arm";
+}
+
+TEST_F(BackupAsProgram, CoupledAxesAndAnotherReachThanTheRobotFilesAreRefusedWithBothValues) {
+  write_parameters(robot("1", "", "6640_2.55_180"));
+  const std::string reach = corrected().refusal;
+  EXPECT_NE(reach.find("says ROB1_6640_2.55_180, the robot file is of ABB IRB 6640-205/2.75"), std::string::npos)
+      << reach;
+  const std::string arm = "#\nARM:\n\n      -name \"rob1_3\" -coupled_upper_joint_bound ";
+  write_parameters(robot("1", "") + arm + "1.2\n");
+  const std::string coupled = corrected().refusal;
+  for (const char* part : {"coupled_upper_joint_bound 1.2 says that axis 3 follows another one",
+                           "SYSPAR/MOC.cfg row 10", "the robot file of ABB IRB 6640-205/2.75 has no coupling of it"})
+    EXPECT_NE(coupled.find(part), std::string::npos) << coupled;
+  write_parameters(robot("1", "") + arm + "0\n");
+  EXPECT_EQ(corrected().refusal, "");
+}
+
+TEST(StatedRobot, AnArmWhoseAxis3IsHeldByBarsNeedsThatCouplingInItsRobotFile) {
+  cam::Program program;
+  program.types.push_back({"ROB1_2400_1.55_16", "use_robot_type", "MOC.cfg", 5});
+  const Chain& six = test::small_cell("cam")->robot;
+  std::vector<Joint> joints;
+  for (int j = 0; j < six.size(); ++j) joints.push_back(six.joint(j));
+  const auto arm = [&](std::vector<Coupling> couplings) {
+    return Chain::make("ABB IRB 2400-16/1.55", joints, std::move(couplings)).value();
+  };
+  const Status none = cam::check_stated_robot(program, arm({}));
+  ASSERT_FALSE(none);
+  EXPECT_NE(sentence(none.error()).find("an arm whose axis 3 is held by bars"), std::string::npos);
+  EXPECT_FALSE(cam::check_stated_robot(program, arm({{2, 1, -1, CouplingKind::kController}})));
+  EXPECT_TRUE(cam::check_stated_robot(program, arm({{2, 1, -1, CouplingKind::kParallelogram}})));
 }
 
 TEST_F(BackupAsProgram, WhereAnotherUnitCarriesTheRobotItsBaseIsNotTakenAndANoteSaysSo) {

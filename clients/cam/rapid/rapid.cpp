@@ -483,7 +483,7 @@ class Reader {
     return read == read_.end() ? "" : read->second;
   }
 
-  void finish(const Site& site, const std::string& why_kept) {
+  void finish(const Site& site, const std::string& kept) {
     std::vector<std::vector<const Use*>> groups;
     for (const Use& use : site.uses) {
       const auto same = std::find_if(groups.begin(), groups.end(), [&](const auto& group) {
@@ -494,12 +494,12 @@ class Reader {
       else
         same->push_back(&use);
     }
-    const bool is_read = !why_kept.empty();
+    const bool is_read = !kept.empty();
     if ((groups.size() > 1 || is_read) && !options_.split) {
       for (const Use& use : site.uses) program_.moves[use.move].left_some = true;
     }
     if (groups.size() > 1 && !options_.split) return leave_ambiguous(site, groups);
-    if (is_read && !options_.split) return leave_read(site, why_kept);
+    if (is_read && !options_.split) return leave_read(site, kept);
     for (std::size_t k = 0; k < groups.size(); ++k) {
       if (k == 0 && !is_read)
         add_target(site, groups[k], site.uses.front().data);
