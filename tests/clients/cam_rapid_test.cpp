@@ -574,5 +574,25 @@ TEST(Rapid, AMotionThatASensorCorrectsIsLeft) {
   EXPECT_NE(why(made, "p10").find("a sensor corrects the path"), std::string::npos) << why(made, "p10");
 }
 
+TEST(Rapid, WhatAnotherTaskSetsOfASharedPersistentIsSetAtRunTime) {
+  const std::string background = "MODULE Bg\n" + kPanel +
+                                 "  PROC main()\n    wPanel.oframe.trans.x:=nCam;\n  ENDPROC\n"
+                                 "ENDMODULE\n";
+  const std::string text = program(target("p10", "0,0,400"), move_l("p10"));
+  for (const auto& [task, shared] : {std::pair("TASK2", true), std::pair("TASK1", false)}) {
+    const test::Corrected made = corrected_by_shift(
+        Dialect::kRapid,
+        {{"RAPID/TASK1/PROGMOD/m.mod", text}, {std::string("RAPID/") + task + "/PROGMOD/b.mod", background}});
+    EXPECT_EQ(row_of(made.program, "p10").corrected(), !shared) << task << made.refusal << why(made, "p10");
+    EXPECT_EQ(why(made, "p10").find("wPanel is set at run time") != std::string::npos, shared) << why(made, "p10");
+  }
+}
+
+TEST(Rapid, AProcedureThatIsMerelyCalledLikeAMotionIsNotTakenForOne) {
+  const test::Corrected made =
+      rapid(program(target("p10", "0,0,400"), "    MoveLOffset p10,v100,fine,tSpindle\\WObj:=wPanel;\n"));
+  EXPECT_NE(why(made, "p10").find("MoveLOffset is not known here"), std::string::npos) << why(made, "p10");
+}
+
 }  // namespace
 }  // namespace trammel::cam

@@ -74,6 +74,13 @@ bool is_literal(const Expression& expression) {
   }
 }
 
+/// `TASK2`, the folder of a backup that a module stands in; empty: it is of no backup.
+std::string task_of(const std::string& file) {
+  const std::size_t at = file.find("TASK");
+  const std::size_t end = at == std::string::npos ? at : file.find('/', at);
+  return end == std::string::npos || (at > 0 && file[at - 1] != '/') ? "" : file.substr(at, end - at);
+}
+
 /// The name whose value an expression is a part of.
 const Expression* root_of(const Expression& expression) {
   const Expression* root = &expression;
@@ -215,7 +222,34 @@ void Interpreter::note_changes() {
     for (std::size_t m = 0; m < modules_.size(); ++m) {
       for (const Instruction& instruction : modules_[m].instructions) note_changes_by(m, instruction);
     }
+    note_changes_by_tasks();
   } while (changed_.size() > before);
+}
+
+/// A persistent that tasks share is one: what one of them sets, another one has.
+void Interpreter::note_changes_by_tasks() {
+  struct Shared {
+    std::set<std::string> tasks;
+    std::vector<const Declaration*> declared;
+    std::string why;
+  };
+  std::map<std::string, Shared> by_name;
+  for (std::size_t m = 0; m < modules_.size(); ++m) {
+    const std::string task = task_of(files_[m].name);
+    for (const Declaration& declared : modules_[m].declarations) {
+      if (task.empty() || declared.storage != Storage::kPers || declared.routine >= 0 || declared.local) continue;
+      Shared& shared = by_name[declared.name];
+      shared.tasks.insert(task);
+      shared.declared.push_back(&declared);
+      for (const auto* changes : {&changed_, &set_in_order_}) {
+        if (const auto change = changes->find(&declared); change != changes->end()) shared.why = change->second;
+      }
+    }
+  }
+  for (const auto& [name, shared] : by_name) {
+    if (shared.tasks.size() < 2 || shared.why.empty()) continue;
+    for (const Declaration* declared : shared.declared) changed_.emplace(declared, shared.why);
+  }
 }
 
 std::optional<std::vector<std::size_t>> Interpreter::fields_of(const Expression& target, const std::string& type,

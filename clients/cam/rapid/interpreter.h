@@ -103,6 +103,7 @@ class Interpreter {
 
  private:
   void note_changes();
+  void note_changes_by_tasks();
   void note_twice(std::size_t module, const Declaration& one, const Declaration& other);
   void note_change(const Expression& target, const Scope& scope, const std::string& why);
   /// The part of a tool or work object of the same module that a constant is assigned to.

@@ -25,18 +25,35 @@ constexpr const char* kToolArgument = "tool";  // `\Tool:=`
 
 bool is_search(const std::string& name) { return name.starts_with("search"); }
 
-/// Instructions of the controller that move the tool to the targets which they are given.
-bool is_motion(const std::string& name) {
-  static const std::set<std::string> kOther = {"moveextj", "movepnp"};
-  for (const char* beginning : {"move", "trigg", "arc", "spot", "disp", "paint", "capl", "capc", "search"}) {
-    if (!name.starts_with(beginning) || kOther.contains(name)) continue;
-    const std::string rest = name.substr(std::string(beginning).size());
-    if (std::string(beginning).starts_with("cap")) return true;
-    if (!rest.empty() && (rest[0] == 'l' || rest[0] == 'j' || rest[0] == 'c' || rest.starts_with("abs") ||
-                          rest.starts_with("ml") || rest.starts_with("mj")))
-      return !rest.starts_with("check") && !rest.starts_with("jointt");
+std::set<std::string> names_of_motions() {
+  struct Kind {
+    const char* beginning;
+    std::vector<const char*> ways, ends;
+  };
+  const std::vector<Kind> kinds = {
+      {"move", {"l", "j", "c", "absj"}, {"", "do", "ao", "go", "sync"}},
+      {"trigg", {"l", "j", "c", "absj"}, {"", "ios"}},
+      {"arc", {"l", "c", "l1", "c1", "l2", "c2"}, {"", "start", "end"}},
+      {"spot", {"l", "j", "ml", "mj"}, {""}},
+      {"disp", {"l", "c"}, {""}},
+      {"paint", {"l", "c"}, {""}},
+      {"cap", {"l", "c"}, {""}},
+      {"search", {"l", "c"}, {""}},
+  };
+  std::set<std::string> names;
+  for (const Kind& kind : kinds) {
+    for (const char* way : kind.ways) {
+      for (const char* end : kind.ends) names.insert(std::string(kind.beginning) + way + end);
+    }
   }
-  return false;
+  return names;
+}
+
+/// Instructions of the controller that move the tool to the targets which they are given. What is merely called alike,
+/// `MoveLOffset`, is a procedure of somebody's.
+bool is_motion(const std::string& name) {
+  static const std::set<std::string> kNames = names_of_motions();
+  return kNames.contains(name);
 }
 
 /// Whether the tool goes to the target on a line or an arc.
