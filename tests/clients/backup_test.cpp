@@ -147,6 +147,20 @@ TEST_F(ImportBackup, RefusesTheBackupOfAnotherRobotThanTheRobotFileIsOf) {
   EXPECT_FALSE(std::filesystem::exists(file("type.yaml")));
 }
 
+TEST_F(ImportBackup, TextInUtf16IsRefusedAsSuch) {
+  const auto in_utf16 = [](const std::string& text) {
+    std::string wide;
+    for (const char c : text) wide += {c, '\0'};
+    return wide;
+  };
+  const auto parameters = cam::read_backup(in_utf16(text(moc)), "MOC.cfg", {}, "");
+  ASSERT_FALSE(parameters);
+  EXPECT_NE(sentence(parameters.error()).find("MOC.cfg: text in UTF-16"), std::string::npos);
+  const auto modules = cam::read_backup(text(moc), "MOC.cfg", {{"user.sys", in_utf16(text(user))}}, "");
+  ASSERT_FALSE(modules);
+  EXPECT_NE(sentence(modules.error()).find("user.sys: text in UTF-16"), std::string::npos);
+}
+
 TEST_F(ImportBackup, AnythingMayStandInTheParameters) {
   const std::string good = text(moc);
   for (std::size_t cut = 0; cut < good.size(); cut += 7)

@@ -50,10 +50,11 @@ std::string yaml_load(const StatedLoad& load) {
 
 class Backup {
  public:
-  Backup(const std::string& parameters, std::string where)
-      : where_(std::move(where)), instances_(parameter_instances(parameters)) {}
+  Backup(const std::string& parameters, const std::string& where)
+      : where_(where), is_text_(check_texts({{where, parameters}})), instances_(parameter_instances(parameters)) {}
 
   Result<ControllerRobot> robot(const std::string& unit, const std::string& next) {
+    if (!is_text_) return tl::make_unexpected(is_text_.error());
     const Result<const ParameterInstance*> robot = choose(unit, next);
     if (!robot) return tl::make_unexpected(robot.error());
     cell_.unit = (*robot)->text("name");
@@ -201,7 +202,14 @@ class Backup {
     cell_.controller_compensates = used.find("calib") != std::string::npos && used.find("uncalib") == std::string::npos;
   }
 
+  static Status check_texts(std::vector<SourceFile> files) {
+    Program program;
+    program.files = std::move(files);
+    return check_files(program);
+  }
+
   Status read_modules(const std::vector<SourceFile>& modules) {
+    if (Status text = check_texts(modules); !text) return text;
     const RapidData data = read_rapid_data(modules);
     const Pose X_BW = cell_.X_WB.inverse();
     for (const ProgramTool& tool : data.tools) {
@@ -273,6 +281,7 @@ class Backup {
   }
 
   const std::string where_;
+  const Status is_text_;
   const std::vector<ParameterInstance> instances_;
   ControllerCell cell_;
 };
