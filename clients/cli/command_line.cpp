@@ -85,6 +85,7 @@ void add_commands(CLI::App& app, Action& chosen) {
   add_service_commands(app, chosen);
   add_audit_command(app, chosen);
   add_store_backup_command(app, chosen);
+  add_store_command(app, chosen);
   add_history_command(app, chosen);
   add_replay_command(app, chosen);
   add_doctor_command(app, chosen);

@@ -56,8 +56,8 @@ class AuditChain {
   std::string hash_;
 };
 
-/// The trail of a store's file, read without changing it, also while a service writes it. Refuses what is no store, or
-/// one of before there was a trail.
-[[nodiscard]] Result<AuditTrail> read_audit(const std::string& path, const AuditQuery& query);
+/// The trail of a store, a file or a database by its URL, read without changing it, also while services write it.
+/// Refuses what is no store, or one of before there was a trail.
+[[nodiscard]] Result<AuditTrail> read_audit(const std::string& place, const AuditQuery& query);
 
 }  // namespace trammel

@@ -1,18 +1,17 @@
-// The trail as it is read: of an open store, and of a file.
+// The trail as it is read: of an open store, and of one that services use.
 #include "server/store/audit.h"
 #include "server/store/audit_rows.h"
 #include "server/store/connection.h"
-#include "server/store/file_header.h"
-#include "server/store/open_database.h"
+#include "server/store/open_to_read.h"
 #include "server/store/store.h"
+#include "server/store/store_place.h"
 
 namespace trammel {
 namespace {
 
-/// A store's file, to be read only.
-Result<AuditTrail> read_all(Database& database, const AuditQuery& query, const std::string& path) {
-  if (integer_of(database, "PRAGMA application_id") != kApplicationId) return refused("no store").in(path);
-  if (!database.has_table("audit")) return refused("of before there was an audit trail").in(path);
+/// Verified as a whole.
+Result<AuditTrail> read_all(Database& database, const AuditQuery& query, const std::string& place) {
+  if (!database.has_table("audit")) return refused("of before there was an audit trail").in(place);
   AuditChain chain;
   AuditTrail trail;
   while (read_more(database, query, chain, trail)) {
@@ -38,15 +37,8 @@ Result<std::int64_t> Store::changes_made() const {
   return connection_->exclusively([](Database& database) -> Result<std::int64_t> { return audit_rows(database); });
 }
 
-Result<AuditTrail> read_audit(const std::string& path, const AuditQuery& query) {
-  try {
-    SqliteDatabase database(path, SQLite::OPEN_READONLY, kBusyTimeout);
-    // One moment of it, while a service goes on writing.
-    const Transaction moment(database, Transaction::For::kReading);
-    return read_all(database, query, path);
-  } catch (const DatabaseError& error) {
-    return failure(ErrorCode::kInternal, "cannot be read: {}", error.what()).in(path);
-  }
+Result<AuditTrail> read_audit(const std::string& place, const AuditQuery& query) {
+  return look_into(place, [&](Database& database) { return read_all(database, query, spoken_place(place)); });
 }
 
 }  // namespace trammel

@@ -1,24 +1,17 @@
 #include "server/store/backup.h"
 
 #include <SQLiteCpp/Backup.h>
-#include <fcntl.h>
 #include <sqlite3.h>
-#include <unistd.h>
 
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <system_error>
 
-#include "server/base/hash.h"
-#include "server/base/part_file.h"
-#include "server/compensate/model_file.h"
-#include "server/store/audit.h"
-#include "server/store/audit_rows.h"
 #include "server/store/file_header.h"
+#include "server/store/new_store_file.h"
 #include "server/store/open_database.h"
 #include "server/store/schema.h"
 #include "server/store/statements.h"
+#include "server/store/store_texts.h"
 
 namespace trammel {
 namespace {
@@ -26,54 +19,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kPagesAtOnce = 256;  // between two looks at the progress
-constexpr const char* kElsewhere = "name a file that you may write, in a folder with room";
-
-/// Removes the file in which a copy is made; one that is whole has another name by then.
-class Unfinished {
- public:
-  explicit Unfinished(std::string path) : path_(std::move(path)) {}
-  ~Unfinished() {
-    std::error_code error;
-    fs::remove(path_, error);
-  }
-  Unfinished(const Unfinished&) = delete;
-  Unfinished& operator=(const Unfinished&) = delete;
-
- private:
-  const std::string path_;
-};
-
-Status on_disk(const std::string& path) {
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  const bool is_there = file >= 0 && ::fsync(file) == 0;
-  const int why = errno;
-  if (file >= 0) ::close(file);
-  if (is_there) return {};
-  return failure(ErrorCode::kInternal, "cannot be written to the disk: {}", std::strerror(why))
-      .in(path)
-      .next(kElsewhere);
-}
 
 Status check_is_store(Database& database, const std::string& path) {
   if (integer_of(database, "PRAGMA application_id") == kApplicationId) return {};
   return refused("no store").in(path);
-}
-
-/// The trail as a whole, as `read_audit()` verifies it.
-Status check_trail(Database& database, StoreCopy& copy) {
-  if (!database.has_table("audit")) return {};  // of before there was one
-  AuditChain chain;
-  AuditTrail trail;
-  const AuditQuery last{"", 0, 1};
-  while (read_more(database, last, chain, trail)) continue;
-  if (trail.broken) return tl::make_unexpected(*trail.broken);
-  copy.audit_rows = trail.verified;
-  if (!trail.rows.empty()) copy.audit_hash = trail.rows.back().hash;
-  return {};
-}
-
-Failure damaged(const std::string& what, const std::string& path) {
-  return failure(ErrorCode::kInternal, "damaged: {}", what).in(path).next("take an older copy");
 }
 
 Status check_size(Database& database, const std::string& path) {
@@ -81,34 +30,9 @@ Status check_size(Database& database, const std::string& path) {
   std::error_code error;
   const auto size = static_cast<std::int64_t>(fs::file_size(path, error));
   if (!error && size == expected) return {};
-  return damaged(fmt::format("{} bytes, and its pages are {}", size, expected), path);
-}
-
-/// Every batch is what was accepted; of one that was pruned the text is gone.
-Status check_batches(Database& database, const std::string& path) {
-  Rows rows = prepare(database, "SELECT cell, id, csv, hash FROM batches WHERE csv <> ''");
-  while (rows.next()) {
-    if (sha256_hex(rows.text(2)) == rows.text(3)) continue;
-    return damaged(fmt::format("batch {} of cell {} is not what was accepted", rows.text(1), rows.text(0)), path);
-  }
-  return {};
-}
-
-/// Every model is what was stored, by its own hashes and by that beside it.
-Status check_models(Database& database, const std::string& path) {
-  Rows rows = prepare(database, "SELECT cell, version, hash, content FROM models WHERE content <> ''");
-  while (rows.next()) {
-    const std::string name = fmt::format("version {} of cell {}", rows.integer(1), rows.text(0));
-    const auto hash = undamaged_hash(rows.text(3), name);
-    if (!hash) return damaged(fmt::format("{}: {}", name, hash.error().message), path);
-    if (*hash != rows.text(2)) return damaged(name + " is not the model that was stored", path);
-  }
-  return {};
-}
-
-Status check_texts(Database& database, const std::string& path) {
-  const Status batches = check_batches(database, path);
-  return batches ? check_models(database, path) : batches;
+  return failure(ErrorCode::kInternal, "damaged: {} bytes, and its pages are {}", size, expected)
+      .in(path)
+      .next("take an older copy");
 }
 
 Result<StoreCopy> checked(Database& database, const std::string& path) {
@@ -123,7 +47,11 @@ Result<StoreCopy> checked(Database& database, const std::string& path) {
   copy.batches = integer_of(database, "SELECT COUNT(*) FROM batches");
   std::error_code error;
   copy.bytes = static_cast<std::int64_t>(fs::file_size(path, error));
-  if (const Status whole = check_trail(database, copy); !whole) return Failure(whole.error()).in(path);
+  if (!database.has_table("audit")) return copy;  // of before there was one
+  const auto trail = check_trail(database);
+  if (!trail) return Failure(trail.error()).in(path);
+  copy.audit_rows = trail->rows;
+  copy.audit_hash = trail->hash;
   return copy;
 }
 
@@ -143,36 +71,23 @@ Status copy_pages(const std::string& from, const std::string& to, const std::fun
   });
 }
 
-Status check_is_new(const std::string& path) {
-  std::error_code error;
-  if (!fs::exists(fs::symlink_status(path, error))) return {};
-  return refused("is there already").in(path).next("name another, or move it away");
-}
-
 }  // namespace
 
 Result<StoreCopy> back_up_store(const std::string& from, const std::string& to,
                                 const std::function<void(double)>& progress) {
-  if (const Status is_new = check_is_new(to); !is_new) return tl::make_unexpected(is_new.error());
   if (std::error_code error; !fs::exists(from, error))
     return failure(ErrorCode::kNotFound, "no such store").in(from).next("its path stands in the server file as store");
-  remove_leftover_parts(to);
-  const std::string part = part_beside(to).string();
-  const Unfinished unfinished(part);
   Result<StoreCopy> copy;
-  try {
-    if (const Status copied = copy_pages(from, part, progress); !copied) return tl::make_unexpected(copied.error());
-    copy = check_store_copy(part);
-  } catch (const DatabaseError& error) {
-    return failure(ErrorCode::kInternal, "cannot be copied to {}: {}", to, error.what()).in(from);
-  }
-  if (!copy) return copy;
-  if (const Status there = on_disk(part); !there) return tl::make_unexpected(there.error());
-  if (::link(part.c_str(), to.c_str()) != 0)  // unlike a rename it replaces nothing
-    return failure(ErrorCode::kRefused, "cannot be written: {}", std::strerror(errno)).in(to).next(kElsewhere);
-  const fs::path folder = fs::path(to).parent_path();
-  if (const Status there = on_disk(folder.empty() ? "." : folder.string()); !there)
-    return tl::make_unexpected(there.error());
+  const Status made = make_store_file(to, [&](const std::string& part) -> Status {
+    try {
+      if (const Status copied = copy_pages(from, part, progress); !copied) return copied;
+      copy = check_store_copy(part);
+      return copy.map([](const StoreCopy&) {});
+    } catch (const DatabaseError& error) {
+      return failure(ErrorCode::kInternal, "cannot be copied to {}: {}", to, error.what()).in(from);
+    }
+  });
+  if (!made) return tl::make_unexpected(made.error());
   return copy;
 }
 

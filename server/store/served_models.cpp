@@ -7,27 +7,15 @@
 
 #include "server/base/text_file.h"
 #include "server/compensate/model_file.h"
-#include "server/store/file_header.h"
-#include "server/store/open_database.h"
+#include "server/store/open_to_read.h"
 #include "server/store/served_copies.h"
 #include "server/store/statements.h"
+#include "server/store/store_place.h"
 
 namespace trammel {
 namespace {
 
 constexpr int kMostLookedAt = 100;  // versions of a cell, as at a start
-
-/// Opens the file to be read and runs `work(database)` on one moment of it.
-template <typename Work>
-auto reading(const std::string& path, const Work& work) -> decltype(work(std::declval<Database&>())) {
-  try {
-    SqliteDatabase database(uri_to_look_at(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
-    const Transaction moment(database, Transaction::For::kReading);
-    return work(database);
-  } catch (const DatabaseError& error) {
-    return failure(ErrorCode::kInternal, "cannot be read: {}", error.what()).in(path);
-  }
-}
 
 Result<CompensatedModel> model_in(const Result<std::string>& text, const std::string& where) {
   if (!text) return tl::make_unexpected(text.error());
@@ -66,26 +54,25 @@ Result<ReadModel> read_model(const ModelOnDisk& on_disk, const std::string& wher
   return tl::make_unexpected(stored.error());
 }
 
-Result<ServedModels> ServedModels::open(const std::string& path) {
+Result<ServedModels> ServedModels::open(const std::string& place) {
   std::error_code error;
-  if (!std::filesystem::exists(path, error) || std::filesystem::file_size(path, error) == 0) return ServedModels("");
-  return reading(path, [&](Database& database) -> Result<ServedModels> {
-    if (integer_of(database, "PRAGMA application_id") != kApplicationId) return refused("no store").in(path);
-    return ServedModels(path);
-  });
+  const bool is_file = !is_postgres_url(place);
+  if (is_file && (!std::filesystem::exists(place, error) || std::filesystem::file_size(place, error) == 0))
+    return ServedModels("");
+  return look_into(place, [&](Database&) -> Result<ServedModels> { return ServedModels(place); });
 }
 
 Result<bool> ServedModels::has(const std::string& cell) const {
   if (path_.empty()) return false;
-  return reading(path_, [&](Database& database) -> Result<bool> {
+  return look_into(path_, [&](Database& database) -> Result<bool> {
     return exists(database, "SELECT 1 FROM activations WHERE cell = $1", cell);
   });
 }
 
 Result<bool> ServedModels::find(const std::string& cell, const ModelVisitor& serves) const {
   if (path_.empty()) return false;
-  return reading(path_, [&](Database& database) -> Result<bool> {
-    ServedCopies copies(path_ + ".models");
+  return look_into(path_, [&](Database& database) -> Result<bool> {
+    ServedCopies copies(is_postgres_url(path_) ? "" : path_ + ".models");
     find_copies(database, copies);
     auto at =
         prepare(database,

@@ -29,11 +29,12 @@ struct ReadModel {
 /// whether one is good, and ends it. False: none was.
 using ModelVisitor = std::function<bool(const ModelOnDisk&)>;
 
-/// A store's file, read without changing it, also while a service writes it and if it is of an older schema.
+/// A store, a file or a database by its URL, read without changing it, also while services write it. A file may be of
+/// an older schema.
 class ServedModels {
  public:
   /// Refuses (kRefused) what is no store. A file that is not there has no models.
-  [[nodiscard]] static Result<ServedModels> open(const std::string& path);
+  [[nodiscard]] static Result<ServedModels> open(const std::string& place);
 
   /// False: nothing of the cell was ever in force.
   [[nodiscard]] Result<bool> has(const std::string& cell) const;

@@ -11,6 +11,8 @@
 #include <system_error>
 
 #include "server/store/file_header.h"
+#include "server/store/open_to_read.h"
+#include "server/store/store_place.h"
 #include "server/store/writer_lock.h"
 
 namespace trammel {
@@ -83,6 +85,7 @@ Status check_file(const fs::path& path) {
 }  // namespace
 
 Status check_store(const std::string& path) {
+  if (is_postgres_url(path)) return look_into(path, [](Database&) -> Status { return {}; });
   return check_folder(path).and_then([&] { return check_file(path); }).and_then([&] { return WriterLock::look(path); });
 }
 

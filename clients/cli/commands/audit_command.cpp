@@ -5,6 +5,7 @@
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/audit_text.h"
 #include "server/store/audit_json.h"
+#include "server/store/store_place.h"
 
 namespace trammel::cli {
 
@@ -23,7 +24,7 @@ Result<std::vector<std::pair<std::string, AuditTrail>>> trails(const AuditArgume
   if (!arguments.store.empty()) {
     auto trail = read_audit(arguments.store, {arguments.cell, arguments.since, arguments.last});
     if (!trail) return tl::make_unexpected(trail.error());
-    all.emplace_back(arguments.store, std::move(*trail));
+    all.emplace_back(spoken_place(arguments.store), std::move(*trail));
     return all;
   }
   const auto session = open_session(arguments.service);
@@ -77,7 +78,7 @@ void add_audit_command(CLI::App& app, Action& chosen) {
   CLI::App* command = app.add_subcommand(
       "audit", "Show who changed what and when, and verify that nothing of it was changed afterwards");
   command->add_option("--store", arguments->store,
-                      "The file of a store, instead of asking a service; also while one runs");
+                      "The file of a store, or its URL, instead of asking a service; also while one runs");
   command->add_option("--cell", arguments->cell, "Only what was changed of this cell");
   command->add_option("--since", arguments->since, "Only what was changed since then, Unix time, s")
       ->check(CLI::NonNegativeNumber);

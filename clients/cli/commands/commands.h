@@ -47,6 +47,7 @@ void add_model_commands(CLI::App& app, Action& chosen);        // train, evaluat
 void add_apply_commands(CLI::App& app, Action& chosen);        // predict, correct
 void add_backup_command(CLI::App& app, Action& chosen);        // import-backup
 void add_store_backup_command(CLI::App& app, Action& chosen);  // backup
+void add_store_command(CLI::App& app, Action& chosen);
 void add_robot_command(CLI::App& app, Action& chosen);         // export-robot
 void add_confirm_command(CLI::App& app, Action& chosen);       // confirm-robot
 void add_doctor_command(CLI::App& app, Action& chosen);

@@ -21,6 +21,7 @@
 #include "server/base/part_file.h"
 #include "server/base/plain_text.h"
 #include "server/store/store_check.h"
+#include "server/store/store_place.h"
 
 namespace trammel::cli {
 
@@ -202,6 +203,7 @@ void look_at_store(const std::string& path, std::vector<Found>& found) {
     return;
   }
   found.push_back({"store", State::kGood, in_use ? "in use by a server" : "could be opened", ""});
+  if (is_postgres_url(path)) return;  // its disk is another host's
   struct statvfs disk {};
   const fs::path folder = fs::path(path).has_parent_path() ? fs::path(path).parent_path() : fs::path(".");
   if (::statvfs(folder.c_str(), &disk) != 0) return;

@@ -3,6 +3,7 @@
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/terminal/output.h"
 #include "server/store/backup.h"
+#include "server/store/store_place.h"
 
 namespace trammel::cli {
 
@@ -33,6 +34,10 @@ Status back_up(const StoreBackupArguments& arguments) {
   if (copies == !arguments.check.empty() || (!copies && !(arguments.store + arguments.output).empty()))
     return failure(ErrorCode::kUsage, "either --store and --output, to copy a store, or --check, to look at a copy")
         .of("--store");
+  if (is_postgres_url(arguments.store))
+    return refused("is a database: pg_dump makes a copy of it, and archiving its journal goes back to any moment")
+        .in(spoken_place(arguments.store))
+        .next("see server/store/README.md, or trammel store copy to a file");
   Result<StoreCopy> copy;
   if (copies) {
     ProgressLine line;

@@ -53,12 +53,12 @@ void Transaction::commit() {
 }
 
 std::int64_t integer_of(Database& database, const char* sql) {
-  Rows row = database.run(sql, {});
+  Rows row = database.run(sql, Database::Values());
   return row.next() ? row.integer64(0) : 0;
 }
 
 std::string text_of(Database& database, const char* sql) {
-  Rows row = database.run(sql, {});
+  Rows row = database.run(sql, Database::Values());
   return row.next() ? row.text(0) : "";
 }
 

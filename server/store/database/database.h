@@ -5,6 +5,7 @@
 #include <initializer_list>
 #include <memory>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -94,15 +95,21 @@ class Rows {
 /// One connection, for one thread at a time. All of it throws DatabaseError.
 class Database {
  public:
-  using Values = std::initializer_list<SqlValue>;
+  using Values = std::span<const SqlValue>;
   virtual ~Database() = default;
 
   /// Statements without values, one after the other.
   virtual void execute(const std::string& statements) = 0;
   /// A statement that has rows, also one that changes something and returns rows: that is made with the first next().
   [[nodiscard]] virtual Rows run(const char* sql, Values values) = 0;
+  [[nodiscard]] Rows run(const char* sql, std::initializer_list<SqlValue> values) {
+    return run(sql, Values(values.begin(), values.size()));
+  }
   /// A statement that changes something; returns how many rows it changed.
   virtual int change(const char* sql, Values values) = 0;
+  int change(const char* sql, std::initializer_list<SqlValue> values) {
+    return change(sql, Values(values.begin(), values.size()));
+  }
   [[nodiscard]] virtual bool has_table(const std::string& name) = 0;
   /// Several processes write it at a time: what a decision rests on is locked row by row, and there are roles.
   [[nodiscard]] virtual bool is_shared() const = 0;

@@ -302,7 +302,8 @@ int PostgresDatabase::change(const char* sql, Values values) {
 }
 
 bool PostgresDatabase::has_table(const std::string& name) {
-  Rows row = run("SELECT to_regclass($1) IS NOT NULL", {sql_value(name)});
+  const std::array<SqlValue, 1> values = {sql_value(name)};
+  Rows row = run("SELECT to_regclass($1) IS NOT NULL", values);
   return row.next() && row.truth(0);
 }
 

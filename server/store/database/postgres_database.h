@@ -20,6 +20,8 @@ class PostgresDatabase final : public Database {
   /// (kRefused) if one lets nobody in, or if all that answer are read-only and `session` is to write.
   [[nodiscard]] static Result<std::unique_ptr<PostgresDatabase>> connect(const std::string& url, Session session);
 
+  using Database::change;
+  using Database::run;
   void execute(const std::string& statements) override;
   [[nodiscard]] Rows run(const char* sql, Values values) override;
   int change(const char* sql, Values values) override;

@@ -14,6 +14,8 @@ class SqliteDatabase final : public Database {
   /// `flags`: those of SQLite. `busy_ms`: how long it waits while another program holds the file.
   SqliteDatabase(const std::string& path, int flags, int busy_ms);
 
+  using Database::change;
+  using Database::run;
   void execute(const std::string& statements) override;
   [[nodiscard]] Rows run(const char* sql, Values values) override;
   int change(const char* sql, Values values) override;

@@ -1,0 +1,95 @@
+#include <CLI/CLI.hpp>
+
+#include "clients/cli/commands/commands.h"
+#include "clients/cli/terminal/options.h"
+#include "clients/cli/terminal/output.h"
+#include "server/store/store_copy.h"
+#include "server/store/store_init.h"
+#include "server/store/store_place.h"
+
+namespace trammel::cli {
+
+namespace {
+
+struct StoreArguments {
+  std::string place, to, role, json;
+};
+
+std::string text_of(const std::string& place, const StoreContent& content) {
+  std::string text = fmt::format("{}: whole, {} audit rows, the last is {}\n", place, content.audit_rows,
+                                 content.audit_hash.empty() ? "none" : content.audit_hash);
+  for (const StoreContent::Table& table : content.tables) {
+    if (table.rows > 0) text += fmt::format("  {:<18} {:>8}  {}\n", table.name, table.rows, table.sha256.substr(0, 16));
+  }
+  return text;
+}
+
+nlohmann::ordered_json json_of(const std::string& place, const StoreContent& content) {
+  nlohmann::ordered_json tables = nlohmann::ordered_json::array();
+  for (const StoreContent::Table& table : content.tables)
+    tables.push_back({{"table", table.name}, {"rows", table.rows}, {"sha256", table.sha256}});
+  return {{"place", place},
+          {"store", content.identity},
+          {"audit_rows", content.audit_rows},
+          {"audit_hash", content.audit_hash},
+          {"tables", std::move(tables)}};
+}
+
+Status init(const StoreArguments& arguments) {
+  if (const Status made = init_store(arguments.place, arguments.role); !made) return made;
+  const std::string place = spoken_place(arguments.place);
+  tell(fmt::format("{} is a store{}\n", place, arguments.role.empty() ? "" : "; " + arguments.role + " may use it"),
+       {arguments.json});
+  return write_json(arguments.json, {{"place", place}, {"granted", arguments.role}});
+}
+
+Status say(const Result<StoreContent>& content, const std::string& place, const StoreArguments& arguments) {
+  if (!content) return tl::make_unexpected(content.error());
+  tell(text_of(spoken_place(place), *content), {arguments.json});
+  return write_json(arguments.json, json_of(spoken_place(place), *content));
+}
+
+Status check(const StoreArguments& arguments) {
+  return say(look_through_store(arguments.place), arguments.place, arguments);
+}
+
+Status copy(const StoreArguments& arguments) {
+  ProgressLine line;
+  return say(copy_store(arguments.place, arguments.to, [&line](double share) { line.show("copying", share); }),
+             arguments.to, arguments);
+}
+
+using Run = Status (*)(const StoreArguments&);
+
+CLI::App* add(CLI::App& store, Action& chosen, const char* name, const char* what, Run run,
+              const std::shared_ptr<StoreArguments>& arguments) {
+  CLI::App* command = store.add_subcommand(name, what);
+  add_json_option(*command, arguments->json);
+  command->callback([arguments, run, &chosen] { chosen = [arguments, run] { return run(*arguments); }; });
+  return command;
+}
+
+}  // namespace
+
+void add_store_command(CLI::App& app, Action& chosen) {
+  CLI::App* store = app.add_subcommand("store", "Make, check and move the store of a service, a file or a PostgreSQL");
+  store->require_subcommand(1);
+  const auto arguments = std::make_shared<StoreArguments>();
+  CLI::App* made = add(*store, chosen, "init", "Make an empty PostgreSQL database a store, or bring one up to date",
+                       init, arguments);
+  made->add_option("URL", arguments->place, "postgresql://OWNER@HOST/DATABASE, as the role that is to own it")
+      ->required();
+  made->add_option("--grant", arguments->role,
+                   "Let this role use it; it may add to the audit trail, and neither change nor delete it");
+  CLI::App* checked =
+      add(*store, chosen, "check", "Look through a whole store, also while services use it", check, arguments);
+  checked->add_option("STORE", arguments->place, "A file, or a URL of PostgreSQL")->required();
+  CLI::App* copied =
+      add(*store, chosen, "copy", "Move a store that no service writes, verified table by table", copy, arguments);
+  copied->add_option("FROM", arguments->place, "A file, or a URL of PostgreSQL")->required();
+  copied->add_option("TO", arguments->to, "The same; a file that is not there, or a database that is empty")
+      ->required();
+  copied->footer("Stop the services first: what they write meanwhile is not copied. Then name TO in the server file.");
+}
+
+}  // namespace trammel::cli

@@ -1,0 +1,38 @@
+#include "server/store/open_to_read.h"
+
+#include <filesystem>
+#include <system_error>
+
+#include "server/store/database/postgres_database.h"
+#include "server/store/database/sqlite_database.h"
+#include "server/store/file_header.h"
+#include "server/store/open_database.h"
+#include "server/store/shared_schema.h"
+#include "server/store/store_place.h"
+
+namespace trammel {
+namespace {
+
+Result<std::unique_ptr<Database>> open_url(const std::string& url) {
+  const std::string place = spoken_place(url);
+  auto database = PostgresDatabase::connect(url, PostgresDatabase::Session::kMayBeReadOnly);
+  if (!database) return Failure(database.error()).in(place);
+  if (const Status ours = check_shared_schema(**database, place); !ours) return tl::make_unexpected(ours.error());
+  return std::unique_ptr<Database>(std::move(*database));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Database>> open_to_read(const std::string& place) {
+  if (is_postgres_url(place)) return open_url(place);
+  auto file =
+      std::make_unique<SqliteDatabase>(uri_to_look_at(place), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
+  if (integer_of(*file, "PRAGMA application_id") != kApplicationId) return refused("no store").in(place);
+  return std::unique_ptr<Database>(std::move(file));
+}
+
+Failure unreadable(const DatabaseError& error, const std::string& place) {
+  return failure(ErrorCode::kInternal, "cannot be read: {}", error.what()).in(spoken_place(place));
+}
+
+}  // namespace trammel

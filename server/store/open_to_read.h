@@ -1,0 +1,31 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "server/base/result.h"
+#include "server/store/database/database.h"
+
+namespace trammel {
+
+/// A store that is only looked at, also while services use it: a file, or a database by its URL. Leaves nothing behind.
+/// Refuses what is no store. Throws DatabaseError.
+[[nodiscard]] Result<std::unique_ptr<Database>> open_to_read(const std::string& place);
+/// What is told where it cannot be read.
+[[nodiscard]] Failure unreadable(const DatabaseError& error, const std::string& place);
+
+/// Runs `work(database)` on one moment of the store at `place`.
+template <typename Work>
+auto look_into(const std::string& place, const Work& work) -> decltype(work(std::declval<Database&>())) {
+  try {
+    const auto database = open_to_read(place);
+    if (!database) return tl::make_unexpected(database.error());
+    const Transaction moment(**database, Transaction::For::kReading);
+    return work(**database);
+  } catch (const DatabaseError& error) {
+    return unreadable(error, place);
+  }
+}
+
+}  // namespace trammel

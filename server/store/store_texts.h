@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "server/base/result.h"
+#include "server/store/database/database.h"
+
+/// What of a store can be verified by its own hashes.
+namespace trammel {
+
+/// Every batch is what was accepted, and every model what was stored. Those that were pruned have no text. Refuses
+/// (kInternal) the first that is not.
+[[nodiscard]] Status check_texts(Database& database, const std::string& place);
+
+struct TrailEnd {
+  std::int64_t rows = 0;
+  std::string hash;  ///< of the last row
+};
+/// The audit trail as a whole. Refuses (kInternal) one that was changed.
+[[nodiscard]] Result<TrailEnd> check_trail(Database& database);
+
+}  // namespace trammel
