@@ -352,6 +352,17 @@ TEST(Fanuc, WordsInCommentsOfPointsMeanNothingAndHideNothing) {
   EXPECT_EQ(made.program.moves_corrected, 1u);
 }
 
+TEST(Fanuc, WhatATouchSearchesOrDisplacesIsLeftUntilItEnds) {
+  const test::Corrected made =
+      ls(program("   2:  Search Start[1] PR[3] ;\n   3:L P[1] 100mm/sec FINE Search[-X] ;\n   4:  Search End ;\n"
+                 "   5:  Touch Offset PR[3] ;\n   6:L P[2] 100mm/sec FINE ;\n   7:  Touch Offset End ;\n"
+                 "   8:L P[3] 100mm/sec FINE ;\n",
+                 position(1, kXyz) + position(2, kXyz) + position(3, kXyz)));
+  EXPECT_NE(why(made, "P[1]").find("a sensor may end the motion (Search)"), std::string::npos) << why(made, "P[1]");
+  EXPECT_NE(why(made, "P[2]").find("Touch Offset (line 10) moves it"), std::string::npos) << why(made, "P[2]");
+  EXPECT_TRUE(row_of(made.program, "P[3]").corrected()) << why(made, "P[3]");
+}
+
 TEST(Fanuc, AToolThatStandsIsLeft) {
   const test::Corrected made = ls(program("   2:L P[1] 100mm/sec FINE RTCP ;\n", position(1, kXyz)));
   EXPECT_NE(why(made, "P[1]").find("the tool stands"), std::string::npos) << why(made, "P[1]");

@@ -439,7 +439,8 @@ TEST(Krl, AnExternalAxisThatMovesWithoutATargetMovesBeneathAll) {
     ASSERT_TRUE(take_idle_axes(read, {"external axis a"})) << motion;
     EXPECT_TRUE(read.moved_axes.empty());
   }
-  EXPECT_TRUE(row_of(krl(program("PTP {A1 10}\nLIN " + kPoint + "\n")).program, kPoint).corrected());
+  EXPECT_TRUE(
+      row_of(krl(program("PTP {A1 10}\nLIN_REL {Z 5,E1 0}\nLIN " + kPoint + "\n")).program, kPoint).corrected());
 }
 
 TEST(Krl, FdatThatTheProgramMakesItselfIsNotGuessed) {

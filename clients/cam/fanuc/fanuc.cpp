@@ -327,8 +327,10 @@ class File {
     const bool names = statement.size() > 2 && (statement[0].is("ERROR_PROG") || statement[0].is("RESUME_PROG"));
     if (monitors) selected.beside = fmt::format("MONITOR {}", shown(statement[1].text));
     if (names) selected.beside = fmt::format("{}={}", statement[0].text, shown(statement[2].text));
-    if (statement.size() > 1 && (statement[0].is("Track") || statement[0].is("TRACK"))) {
-      const bool ends = statement[1].is("End") || statement[1].is("END");
+    const bool touched = statement.size() > 2 && statement[0].is("Touch") && statement[1].is("Offset");
+    if (touched || (statement.size() > 1 && (statement[0].is("Track") || statement[0].is("TRACK")))) {
+      const Piece& last = statement[touched ? 2 : 1];
+      const bool ends = last.is("End") || last.is("END");
       selected.follows =
           ends ? "" : fmt::format("{} {} (line {})", statement[0].text, shown(statement[1].text), statement[0].line);
     }
@@ -602,7 +604,8 @@ class File {
           piece.is("VOFFSET") || piece.is("INC"))
         why = fmt::format("{} displaces it at run time", piece.text);
       if (piece.is("RTCP")) why = "the tool stands and the robot holds the work piece (RTCP)";
-      if (piece.is("Skip") || piece.is("SKIP")) why = "a sensor may end the motion (Skip)";
+      if (piece.is("Skip") || piece.is("SKIP") || piece.is("Search"))
+        why = fmt::format("a sensor may end the motion ({})", piece.text);
     }
     for (std::size_t at = 1; at + 2 < statement.size(); ++at) {
       if ((!statement[at].is("P") && !statement[at].is("PR")) || !statement[at + 1].is("[")) continue;

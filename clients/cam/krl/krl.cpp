@@ -213,8 +213,11 @@ class Reader {
     const std::vector<Value> target = krl::operands_at(tokens, 1, &end);
     if (target.size() != 1 || target[0].kind != Value::Kind::kAggregate) return;
     const bool whole = target[0].field("X") != nullptr || target[0].field("A1") != nullptr;
-    for (int axis = 0; axis < 6 && (!whole || is_relative(tokens[0].text)); ++axis) {
-      if (target[0].field(fmt::format("E{}", axis + 1)) != nullptr) program_.moved_axes.insert(axis);
+    const bool relative = is_relative(tokens[0].text);
+    for (int axis = 0; axis < 6 && (!whole || relative); ++axis) {
+      const Value* to = target[0].field(fmt::format("E{}", axis + 1));
+      const bool stands = relative && to != nullptr && to->kind == Value::Kind::kNumber && to->number == 0;
+      if (to != nullptr && !stands) program_.moved_axes.insert(axis);
     }
   }
 
