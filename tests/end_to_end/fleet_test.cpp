@@ -44,8 +44,10 @@ class Fleet : public testing::Test {
     ASSERT_TRUE(write_text_file(daemon.config_path(), text + keys));
     daemon.start();
   }
-  static std::unique_ptr<client::Session> session_with(std::initializer_list<const test::Daemon*> daemons) {
+  static std::unique_ptr<client::Session> session_with(std::initializer_list<const test::Daemon*> daemons,
+                                                       milliseconds patience = seconds(30)) {
     client::SessionOptions options = (*daemons.begin())->session_options();
+    options.timeout = patience;
     options.server_ports.clear();
     for (const test::Daemon* daemon : daemons) options.server_ports.push_back(daemon->port());
     auto opened = client::Session::open(options);
@@ -90,7 +92,7 @@ TEST_F(Fleet, WhatIsPutInForceOnOneServerIsServedByAllAndDecidedOnAny) {
   EXPECT_EQ(made, 2) << "a number is one model's in the whole fleet";
   client::ChangeOptions forced;
   forced.force = true;
-  ASSERT_TRUE(other->activate("cell-7", 1, forced));
+  for (const int version : {2, 1}) ASSERT_TRUE(other->activate("cell-7", version, forced));
   wait_until([&] { return served(*one) == 1; }, "the first one serves it");
   client::ChangeOptions late;
   late.expected_version = 2;
@@ -147,7 +149,8 @@ TEST_F(Fleet, WhileTheRecordIsAwayPredictionsGoOnAndNothingAcknowledgedIsLost) {
   database_.stop();
   EXPECT_EQ(served(*one), 1);
   EXPECT_EQ(served(*other), 1);
-  const auto refused = one->submit_measurements("cell-7", "b2", test::virtual_batch_csv(60, 2));
+  const auto hasty = session_with({&first_}, seconds(4));
+  const auto refused = hasty->submit_measurements("cell-7", "b2", test::virtual_batch_csv(60, 2));
   EXPECT_FALSE(refused) << "nothing is acknowledged that is not in the record";
   database_.start();
   wait_until([&] { return one->submit_measurements("cell-7", "b3", test::virtual_batch_csv(60, 3)).has_value(); },
