@@ -12,12 +12,12 @@ constexpr std::int64_t kChangesKept = 100'000;
 
 /// Who put in force what is in force, and when, as a clause; empty: not recorded.
 std::string who_decided(Database& database, const std::string& cell) {
-  auto row = prepare(
-      database, "SELECT who, what, at FROM audit WHERE cell = $1 AND subject = 'in force' ORDER BY number DESC LIMIT 1",
-      cell);
+  auto row =
+      prepare(database,
+              "SELECT who, at FROM audit WHERE cell = $1 AND subject = 'in force' ORDER BY number DESC LIMIT 1", cell);
   if (!row.next()) return "";
-  const auto ago = std::max<std::int64_t>(unix_now() - row.integer64(2), 0);
-  return fmt::format("; {} did that ({}) {} s ago", row.text(0), row.text(1), ago);
+  return fmt::format("; {} put it in force {} s ago", row.text(0),
+                     std::max<std::int64_t>(unix_now() - row.integer64(1), 0));
 }
 
 }  // namespace

@@ -150,6 +150,7 @@ TEST_F(AuditTest, WhereAnotherVersionIsInForceThanExpectedNothingChangesAndNothi
   const auto refused = store_->add_job(job("lt-07"), false, id);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kConflict);
+  EXPECT_NE(refused.error().message.find("service put it in force"), std::string::npos) << refused.error().message;
   EXPECT_EQ(store_->set_quarantine("cell-7", "lt-07", "strange", id).error().code, ErrorCode::kConflict);
   EXPECT_EQ(demand(store_->audit()).rows.size(), before);
   id.expected_version = 1;
