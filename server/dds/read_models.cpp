@@ -57,6 +57,16 @@ Result<CellHealth> health_in(const Store& store, const ModelRegistry& registry, 
   return health;
 }
 
+nlohmann::ordered_json record_json(const RecordState& record) {
+  nlohmann::ordered_json json = {{"kind", record.kind},
+                                 {"place", record.place},
+                                 {"reachable", record.reachable},
+                                 {"away_since_unix_s", nullptr},
+                                 {"survives", record.survives}};
+  if (record.away_since) json["away_since_unix_s"] = *record.away_since;
+  return json;
+}
+
 Status check_fits(const std::string& what, std::size_t bytes) {
   if (bytes <= wire::kMaxText) return {};
   return failure(ErrorCode::kTooLarge, "{} has {} bytes, limit {}", what, bytes, wire::kMaxText)
@@ -245,8 +255,11 @@ Result<ReadModelsReply> Handlers::health_of(const std::string& cell, std::int64_
     cells.push_back(cell_health_json(*health));
   }
   ReadModelsReply reply;
-  reply.text(nlohmann::ordered_json{{"cells", std::move(cells)}}.dump(
-      -1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  const nlohmann::ordered_json answer = {{"server", store_.server()},
+                                         {"trains", trainer_.trains()},
+                                         {"record", record_json(store_.record())},
+                                         {"cells", std::move(cells)}};
+  reply.text(answer.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   if (const Status fits = check_fits("the health of cells", reply.text().size()); !fits)
     return Failure(fits.error()).next("ask for fewer checks");
   return reply;

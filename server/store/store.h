@@ -166,6 +166,9 @@ class Store {
 
   /// Never waits for the disk.
   [[nodiscard]] StoreState state() const;
+  [[nodiscard]] RecordState record() const;
+  /// As works_as() said.
+  [[nodiscard]] const std::string& server() const;
   /// Where it could not be written, or is not as it was left: whether it can be written now. Opens the file again where
   /// needed, once a second at most.
   [[nodiscard]] Status try_again();

@@ -9,6 +9,15 @@
 
 namespace trammel {
 
+/// Where a store is, for people who look at servers.
+struct RecordState {
+  std::string kind;   ///< `sqlite`, `postgresql`
+  std::string place;  ///< a file, or a URL without password and options
+  bool reachable = true;
+  std::optional<std::int64_t> away_since = {};  ///< Unix time, s
+  std::string survives;                         ///< what a change that was acknowledged survives; empty: not known now
+};
+
 /// What the disk lets a store do.
 struct StoreState {
   std::optional<Error> why_not_written;  ///< set: every change is refused with it

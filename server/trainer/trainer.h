@@ -54,6 +54,8 @@ class Trainer {
   /// Asks the running training to give up (its job stays queued in the store) and joins.
   void stop();
 
+  /// Whether it works on jobs.
+  [[nodiscard]] bool trains() const { return options_.trains; }
   /// Stays as it is until the end; the next call may give more cells.
   [[nodiscard]] const ServedCells& cells() const { return cells_.now(); }
   /// From now on these cells are served too, with what the store has of them: the model in force, and the jobs that

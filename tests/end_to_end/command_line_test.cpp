@@ -878,6 +878,9 @@ TEST_F(CommandLineWithService, ACheckIsAnsweredThereAsOnFilesAndTheServiceKeepsW
   EXPECT_TRUE(known["in_force"]["after_mm"].is_number()) << "as its training was judged";
   const json status = json::parse(must_answer({"status", "--json", "-"}).out);
   EXPECT_EQ(status.at("health").at(0).at("verdict"), here.at("verdict"));
+  EXPECT_EQ(status.at("record").at("kind"), "sqlite");
+  EXPECT_TRUE(status.at("record").at("reachable"));
+  EXPECT_TRUE(status.at("servers").at(0).at("trains"));
   EXPECT_NE(must_answer({"status"}).out.find("cell cell-7: " + here.at("verdict").get<std::string>()),
             std::string::npos);
   EXPECT_EQ(trammel({"check", "--model", file("served.model")}).exit_code, kWrongUsage);

@@ -121,6 +121,19 @@ std::vector<std::string> lasting_divergence(client::Session& session) {
   return servers ? divergence_of(*servers) : std::vector<std::string>();
 }
 
+/// What a server that answers does besides, as far as it says so.
+ordered_json part_of(const std::string& server, const std::vector<ordered_json>& answers) {
+  ordered_json part = {{"serves", true}, {"trains", nullptr}, {"reachable", true}};
+  for (const ordered_json& answer : answers)
+    if (answer.value("server", ordered_json()) == server) part["trains"] = answer.value("trains", ordered_json());
+  return part;
+}
+
+/// The record of the servers, as the first of them says.
+ordered_json record_of(const std::vector<ordered_json>& answers) {
+  return answers.empty() ? ordered_json() : answers.front().value("record", ordered_json());
+}
+
 Status status(client::Session& session, const ServiceArguments& arguments) {
   const Result<std::vector<client::ServerStatus>> servers = session.servers();
   if (!servers) return tl::make_unexpected(servers.error());
@@ -130,22 +143,27 @@ Status status(client::Session& session, const ServiceArguments& arguments) {
   if (!apart) return tl::make_unexpected(apart.error());
   const Result<std::vector<client::DatedJob>> jobs = session.jobs("");
   if (!jobs) return tl::make_unexpected(jobs.error());
-  const Result<std::vector<ordered_json>> health = health_at(session, "", 1);
-  if (!health) return tl::make_unexpected(health.error());
+  const Result<std::vector<ordered_json>> answers = health_answers(session, "", 1);
+  if (!answers) return tl::make_unexpected(answers.error());
+  const std::vector<ordered_json> health = cells_of(*answers);
   std::string text, checked;
-  for (const ordered_json& cell : *health) checked += is_checked(cell) ? cell_health_line(cell) : "";
+  for (const ordered_json& cell : health) checked += is_checked(cell) ? cell_health_line(cell) : "";
   ordered_json list = ordered_json::array();
   for (const client::ServerStatus& server : *servers) {
     text += server_text(server);
     list.push_back(server_json(server));
+    list.back().update(part_of(server.server_id, *answers));
   }
+  const ordered_json record = record_of(*answers);
+  text += record_text(record);
   const std::vector<std::string> divergent = lasting_divergence(session);
   for (const std::string& one : divergent) text += "divergent: " + one + "\n";
   tell(text + models_text(*models) + checked + jobs_text(*jobs) + quarantine_text(*apart), {arguments.json});
-  return write_json(arguments.json, {{"servers", list},
+  return write_json(arguments.json, {{"record", record},
+                                     {"servers", list},
                                      {"divergent", divergent},
                                      {"models", models_json(*models)},
-                                     {"health", *health},
+                                     {"health", health},
                                      {"jobs", jobs_json(*jobs)},
                                      {"quarantine", quarantine_json(*apart)}});
 }

@@ -1,26 +1,52 @@
 #include "clients/cli/service/health_answers.h"
 
+#include <algorithm>
+#include <utility>
+
 #include "server/base/json_guard.h"
 
 namespace trammel::cli {
 
-Result<std::vector<nlohmann::ordered_json>> health_at(client::Session& session, const std::string& cell,
-                                                      std::size_t most) {
+namespace {
+
+using nlohmann::ordered_json;
+
+Result<ordered_json> answer_in(const std::string& text) {
+  if (const Status small = check_json_limits(text, "the health of cells"); !small)
+    return tl::make_unexpected(small.error());
+  ordered_json json = ordered_json::parse(text, nullptr, false);
+  if (!json.is_object() || !json.contains("cells") || !json["cells"].is_array())
+    return failure(ErrorCode::kInternal, "what the service says of the health of cells has no cells");
+  for (const auto& one : json["cells"])
+    if (!one.is_object()) return failure(ErrorCode::kInternal, "the health of a cell is no object");
+  return json;
+}
+
+}  // namespace
+
+Result<std::vector<ordered_json>> health_answers(client::Session& session, const std::string& cell, std::size_t most) {
   const auto texts = session.health(cell, most);
   if (!texts) return tl::make_unexpected(texts.error());
-  std::vector<nlohmann::ordered_json> cells;
+  std::vector<ordered_json> answers;
   for (const std::string& text : *texts) {
-    if (const Status small = check_json_limits(text, "the health of cells"); !small)
-      return tl::make_unexpected(small.error());
-    const auto json = nlohmann::ordered_json::parse(text, nullptr, false);
-    if (!json.is_object() || !json.contains("cells") || !json["cells"].is_array())
-      return failure(ErrorCode::kInternal, "what the service says of the health of cells has no cells");
-    for (const auto& one : json["cells"]) {
-      if (!one.is_object()) return failure(ErrorCode::kInternal, "the health of a cell is no object");
-      cells.push_back(one);
-    }
+    auto answer = answer_in(text);
+    if (!answer) return tl::make_unexpected(answer.error());
+    answers.push_back(std::move(*answer));
+  }
+  return answers;
+}
+
+std::vector<ordered_json> cells_of(const std::vector<ordered_json>& answers) {
+  std::vector<ordered_json> cells;
+  for (const ordered_json& answer : answers) {
+    for (const ordered_json& cell : answer["cells"])
+      if (std::find(cells.begin(), cells.end(), cell) == cells.end()) cells.push_back(cell);
   }
   return cells;
+}
+
+Result<std::vector<ordered_json>> health_at(client::Session& session, const std::string& cell, std::size_t most) {
+  return health_answers(session, cell, most).map(cells_of);
 }
 
 }  // namespace trammel::cli

@@ -219,6 +219,17 @@ ordered_json server_json(const client::ServerStatus& server) {
           {"replica", server.replica ? replica_json(*server.replica) : ordered_json(nullptr)}};
 }
 
+std::string record_text(const ordered_json& record) {
+  const auto word = [&record](const char* key) {
+    const bool is_there = record.is_object() && record.contains(key) && record[key].is_string();
+    return is_there ? record[key].get<std::string>() : std::string();
+  };
+  if (word("kind") != "postgresql") return "";
+  if (record.value("reachable", ordered_json()) != true)
+    return fmt::format("record: {} is away; what is in force is served, and every change is refused\n", word("place"));
+  return fmt::format("record: {}; an acknowledged change survives {}\n", word("place"), word("survives"));
+}
+
 std::string quarantine_text(const std::vector<client::BatchOfService>& batches) {
   std::string text;
   for (const client::BatchOfService& one : batches) {

@@ -25,6 +25,9 @@ namespace trammel::cli {
 /// Cells that two replicas serve with different models though both have the same decisions: one sentence each.
 [[nodiscard]] std::vector<std::string> divergence_of(const std::vector<client::ServerStatus>& servers);
 
+/// Of `record` as a server says it; empty where that is a file beside the server.
+[[nodiscard]] std::string record_text(const nlohmann::ordered_json& record);
+
 [[nodiscard]] nlohmann::ordered_json quarantine_json(const std::vector<client::BatchOfService>& batches);
 [[nodiscard]] std::string quarantine_text(const std::vector<client::BatchOfService>& batches);
 
