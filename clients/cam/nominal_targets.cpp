@@ -48,8 +48,7 @@ class Finding {
     if (doubts > 0)
       found_.notes.push_back(
           fmt::format("{} targets: what the program says of the configuration contradicts itself, or the motion "
-                      "before; the receipt "
-                      "says what is followed",
+                      "before; the receipt says what is followed",
                       doubts));
     return std::move(found_);
   }
@@ -181,12 +180,8 @@ class Finding {
       const bool enough = stand.q && (!stand.posture_only || on_a_line);
       if (!enough && !program_.targets[t].configuration.said()) return leave_open(t, kNotSaid);
       if (!enough) note_as_said(t);
-      const std::optional<JointVector> said = enough ? as_said(t, stand.q).q : std::nullopt;
       take(t, enough ? arm_.nearest(flange_of(t), program_.targets[t].external, *stand.q, on_a_line) : as_said(t, {}));
-      // Branches by number are placeholders where lines pass over them; status and turns are what was stored.
-      const Configuration& stored = program_.targets[t].configuration;
-      if (stored.said() && !stored.conf && said && target.q && !same_posture(*said, *target.q))
-        target.doubt = kOtherStatus;
+      if (enough) note_other_status(t, *stand.q);
       if (!was.q || !target.q) continue;
       if (!same_posture(*was.q, *target.q)) return leave_open(t, "motions come to it in different postures");
       target = was;
@@ -201,6 +196,15 @@ class Finding {
         "{} ({} line {}): the controller takes the joints nearest to those before, which the program does not say; the "
         "configuration of the target is taken",
         shown(target.name), program_.files[target.file].name, target.line));
+  }
+
+  /// Branches by number are placeholders where lines pass over them; status and turns are what was stored.
+  void note_other_status(std::size_t t, const JointVector& before) {
+    const Configuration& stored = program_.targets[t].configuration;
+    NominalTarget& target = found_.targets[t];
+    if (!stored.said() || stored.conf || !target.q) return;
+    const std::optional<JointVector> said = as_said(t, before).q;
+    if (said && !same_posture(*said, *target.q)) target.doubt = kOtherStatus;
   }
 
   void leave_open(std::size_t t, const char* why) {
