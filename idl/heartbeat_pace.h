@@ -18,8 +18,8 @@ namespace trammel::wire {
 /// and the lock that every reply needs. One HEARTBEAT of a writer within kBetween says the same; while anything is
 /// unconfirmed the library repeats it by itself.
 ///
-/// And thins what the library asks of a writer that has not offered anything yet: a thousand times a second, until the
-/// writer offers something or its lease is over. Each question leaves when the time since the first has doubled.
+/// And thins what the library asks of a writer that has not offered anything yet: every 20 ms, until the writer offers
+/// something or its lease is over. Each question leaves when the time since the first has doubled.
 /// Thread-safe.
 class HeartbeatPace {
  public:

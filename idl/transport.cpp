@@ -74,7 +74,8 @@ void set_writer_times(dds::DataWriterQos& qos, std::chrono::milliseconds heartbe
 
 void set_reader_times(dds::DataReaderQos& qos) {
   qos.reliable_reader_qos().times.heartbeatResponseDelay = to_duration(std::chrono::milliseconds(0));
-  qos.reliable_reader_qos().times.initialAcknackDelay = to_duration(std::chrono::milliseconds(1));
+  // Repeated until the writer offers something; a writer may be left by whoever died, or never mean to.
+  qos.reliable_reader_qos().times.initialAcknackDelay = to_duration(std::chrono::milliseconds(20));
 }
 
 }  // namespace
