@@ -124,7 +124,7 @@ TEST_F(BackupAsProgram, CoupledAxesAndAnotherReachThanTheRobotFilesAreRefusedWit
 TEST(StatedRobot, AnArmWhoseAxis3IsHeldByBarsNeedsThatCouplingInItsRobotFile) {
   cam::Program program;
   program.types.push_back({"ROB1_2400_1.55_16", "use_robot_type", "MOC.cfg", 5});
-  const Chain& six = test::small_cell("cam")->robot;
+  const Chain six = test::small_cell("cam")->robot;
   std::vector<Joint> joints;
   for (int j = 0; j < six.size(); ++j) joints.push_back(six.joint(j));
   const auto arm = [&](std::vector<Coupling> couplings) {

@@ -26,11 +26,11 @@ constexpr const char* kToolArgument = "tool";  // `\Tool:=`
 bool is_search(const std::string& name) { return name.starts_with("search"); }
 
 std::set<std::string> names_of_motions() {
-  struct Kind {
+  struct Family {
     const char* beginning;
     std::vector<const char*> ways, ends;
   };
-  const std::vector<Kind> kinds = {
+  const std::vector<Family> families = {
       {"move", {"l", "j", "c", "absj"}, {"", "do", "ao", "go", "sync"}},
       {"trigg", {"l", "j", "c", "absj"}, {"", "ios"}},
       {"arc", {"l", "c", "l1", "c1", "l2", "c2"}, {"", "start", "end"}},
@@ -41,9 +41,9 @@ std::set<std::string> names_of_motions() {
       {"search", {"l", "c"}, {""}},
   };
   std::set<std::string> names;
-  for (const Kind& kind : kinds) {
-    for (const char* way : kind.ways) {
-      for (const char* end : kind.ends) names.insert(std::string(kind.beginning) + way + end);
+  for (const Family& family : families) {
+    for (const char* way : family.ways) {
+      for (const char* end : family.ends) names.insert(std::string(family.beginning) + way + end);
     }
   }
   return names;
