@@ -74,7 +74,7 @@ std::string lacking(const CauseRecord& record, int joint, const Cell& cell, cons
   if (needs.payload && !carries(cell, poses)) return "a payload";
   if (needs.direction && joint >= 0 && !(approached(poses, joint, 1) && approached(poses, joint, -1)))
     return "approaching the poses from both sides of this joint";
-  if (needs.temperature && !shows_alike_at_all(record) && !warms(poses, learned_at))
+  if (needs.temperature && !warms(poses, learned_at))
     return "temperatures that differ between the poses, or from those of the training";
   if (needs.velocity || needs.time) return "a continuous path with times";
   if (needs.before || needs.history) return "a batch of many poses with their times";
@@ -123,10 +123,13 @@ CauseEffects::CauseEffects(PhysicalModel model, const std::vector<PoseContext>& 
       const std::string lacks = lacking(*record, joint, *model_.cell, poses, learned_at);
       if (lacks.empty()) {
         add(*record, joint);
-      } else {
+      } else if (!shows_alike_at_all(*record)) {
         not_asked_.push_back(cause_not_asked(*record, joint, lacks));
       }
     }
+  }
+  for (const CauseRecord* record : all_causes()) {
+    if (!is_warmth_recorded_ && may_have_changed(*record) && shows_alike_at_all(*record)) add(*record, -1);
   }
   find_places();
 }
