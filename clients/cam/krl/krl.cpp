@@ -75,6 +75,9 @@ bool is_relative(const std::string& word) {
   return word.ends_with("_REL") && is_motion(word.substr(0, word.size() - 4));
 }
 
+/// `PTP`, `SPTP`, `PTP_REL`
+bool is_by_axes(const std::string& word) { return word.find("PTP") != std::string::npos; }
+
 /// `PTP $AXIS_ACT` goes to where the axes are: it has no target.
 bool stands_still(const std::vector<Token>& tokens) {
   const bool alone = tokens.size() == 2 || (tokens.size() > 2 && tokens[2].kind == TokenKind::kWord);
@@ -831,7 +834,7 @@ class Reader {
     if (is_relative(word)) return leave(f, k, text_of(f, tokens, 1), "it is relative to where the robot is");
     if (const auto head = spline_heads_.find({f, k}); head != spline_heads_.end()) apply_with(f, head->second, state);
     apply_with(f, k, state);
-    if (state.speed > program_.moves[move].speed_mm_s.value_or(0) && word.find("PTP") == std::string::npos)
+    if (state.speed > program_.moves[move].speed_mm_s.value_or(0) && !is_by_axes(word))
       program_.moves[move].speed_mm_s = state.speed;
     state.tool = tool_carrying(state.tool, state.load);
     std::size_t next = 1;
@@ -860,7 +863,7 @@ class Reader {
                       f,
                       lines_[f][k].number,
                       move,
-                      lines_[f][k].tokens[0].text.find("PTP") == std::string::npos};
+                      !is_by_axes(lines_[f][k].tokens[0].text)};
     if (operands.size() > 1 || operands[0].kind == Value::Kind::kAggregate) {
       places_[{f, operands[0].begin}] = {f, k, operands};
       note_axes(operands[0], move);
@@ -909,7 +912,10 @@ class Reader {
       for (std::size_t k = routine.first; k < routine.last; ++k) {
         const std::vector<Token>& tokens = lines_[routine.file][k].tokens;
         for (const std::size_t called : called_by(tokens)) steps.push_back({Step::Kind::kCall, std::to_string(called)});
-        if (moves_.contains({routine.file, k})) moves.emplace(steps.size(), std::pair(routine.file, k));
+        const auto move = moves_.find({routine.file, k});
+        // A line that is left leaves the posture as it was.
+        if (move != moves_.end() && (is_by_axes(tokens[0].text) || !program_.moves[move->second].targets.empty()))
+          moves.emplace(steps.size(), std::pair(routine.file, k));
         steps.push_back(step_of(tokens));
       }
       steps.push_back({Step::Kind::kEnd});
@@ -928,7 +934,7 @@ class Reader {
   /// to zero.
   void follow(std::size_t f, std::size_t k, const std::set<std::size_t>& before) {
     ProgramMove& move = program_.moves[moves_.at({f, k})];
-    const bool by_axes = lines_[f][k].tokens[0].text.find("PTP") != std::string::npos;
+    const bool by_axes = is_by_axes(lines_[f][k].tokens[0].text);
     const bool says = std::any_of(move.targets.begin(), move.targets.end(),
                                   [&](std::size_t t) { return program_.targets[t].configuration.said(); });
     if (resumes_ || before.contains(kNoMotion) || (by_axes && (says || move.targets.empty()))) return;
