@@ -305,7 +305,8 @@ TEST(Krl, AToolThatStandsIsSaidInEveryForm) {
   for (const char* with : {"$IPO_MODE= SIPO_MODE( FTCP.IPO_FRAME)", "$IPO_MODE=#TCP",
                            "$TOOL= STOOL2( FTCP), $BASE= SBASE( FTCP.BASE_NO),$IPO_MODE= SIPO_MODE( FTCP.IPO_FRAME)"}) {
     const test::Corrected made = krl(program("SPTP XP1 WITH $VEL_AXIS[1]= SVEL_JOINT( 100.0), " + std::string(with) +
-                                             "\nSLIN " + kPoint + " WITH $IPO_MODE= SIPO_MODE( FP1.IPO_FRAME)\n"),
+                                             "\nPTP {A1 0,A2 -20,A3 20,A4 0,A5 30,A6 0}\nSLIN " + kPoint +
+                                             " WITH $IPO_MODE= SIPO_MODE( FP1.IPO_FRAME)\n"),
                                      kFdat);
     EXPECT_NE(why(made, "XP1").find("the tool stands"), std::string::npos) << with << why(made, "XP1");
     EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << with << why(made, kPoint);
@@ -439,8 +440,7 @@ TEST(Krl, AnExternalAxisThatMovesWithoutATargetMovesBeneathAll) {
     ASSERT_TRUE(take_idle_axes(read, {"external axis a"})) << motion;
     EXPECT_TRUE(read.moved_axes.empty());
   }
-  EXPECT_TRUE(
-      row_of(krl(program("PTP {A1 10}\nLIN_REL {Z 5,E1 0}\nLIN " + kPoint + "\n")).program, kPoint).corrected());
+  EXPECT_TRUE(row_of(krl(program("LIN_REL {Z 5,E1 0}\nLIN " + kPoint + "\n")).program, kPoint).corrected());
 }
 
 TEST(Krl, FdatThatTheProgramMakesItselfIsNotGuessed) {
