@@ -560,6 +560,9 @@ TEST(Rapid, APointThatOnlyAnUnknownInstructionIsGivenIsLeftAndNotCalledUnused) {
   EXPECT_NE(why(made, "p20").find("FCPressL is not known here: it may move the robot there"), std::string::npos)
       << why(made, "p20");
   EXPECT_TRUE(row_of(made.program, "p10").corrected());
+  const test::Corrected read = rapid(program(target("p10", "0,0,400") + target("p20", "0,10,400"),
+                                             move_l("p10") + "    TPWrite \"x\"\\Pos:=p20.trans;\n"));
+  EXPECT_EQ(read.program.left_alone(), 0u) << "a point that is shown only is unused";
 }
 
 TEST(Rapid, ANameThatAFileDeclaresTwiceIsLeft) {

@@ -318,7 +318,7 @@ class Job {
  private:
   /// `SMOVL C00000 ...`, `SYMOVL C00000 ...`: of a part that moves, or more.
   void unknown(const Statement& statement, const std::vector<Piece>& pieces) {
-    static const std::set<std::string> kStill = {"REFP", "MFRAME", "SETTOOL"};
+    static const std::set<std::string> kStill = {"REFP", "MFRAME", "SETTOOL", "CALL", "JUMP", "PSTART"};
     const std::string word = word_from(pieces[0].begin);
     if (kStill.contains(word)) return;
     for (const Piece& piece : pieces) {

@@ -44,16 +44,8 @@ const std::map<std::string, std::vector<BuiltIn>>& built_in() {
 
 /// Instructions that leave the data which they are given as they are.
 bool only_reads(const std::string& name) {
-  static const std::set<std::string> kReaders = {
-      "set",          "reset",        "setdo",      "setgo",       "setao",    "pulsedo",    "waittime",
-      "waituntil",    "waitdi",       "waitdo",     "tpwrite",     "tperase",  "write",      "errwrite",
-      "stop",         "gripload",     "pdispset",   "pdispon",     "eoffsset", "eoffson",    "actunit",
-      "confl",        "confj",        "singarea",   "accset",      "velset",   "softact",    "waitrob",
-      "speedrefresh", "stopmove",     "startmove",  "return",      "triggio",  "triggequip", "triggint",
-      "mechunitload", "waitsynctask", "syncmoveon", "syncmoveoff", "exit",     "raise",      "connect",
-      "isignaldi",    "deactunit",    "corron",     "worldacclim", "invertdo", "tpshow",     "uishow"};
   static const std::set<std::string> kMotions = {"move", "trig", "arc", "spot", "disp", "pain", "capl", "capc"};
-  if (kReaders.contains(name)) return true;
+  if (is_still(name)) return true;
   for (const std::string& beginning : kMotions) {
     if (name.starts_with(beginning)) return true;
   }
@@ -89,6 +81,18 @@ const Expression* root_of(const Expression& expression) {
 }
 
 }  // namespace
+
+bool is_still(const std::string& instruction) {
+  static const std::set<std::string> kReaders = {
+      "set",          "reset",        "setdo",      "setgo",       "setao",    "pulsedo",    "waittime",
+      "waituntil",    "waitdi",       "waitdo",     "tpwrite",     "tperase",  "write",      "errwrite",
+      "stop",         "gripload",     "pdispset",   "pdispon",     "eoffsset", "eoffson",    "actunit",
+      "confl",        "confj",        "singarea",   "accset",      "velset",   "softact",    "waitrob",
+      "speedrefresh", "stopmove",     "startmove",  "return",      "triggio",  "triggequip", "triggint",
+      "mechunitload", "waitsynctask", "syncmoveon", "syncmoveoff", "exit",     "raise",      "connect",
+      "isignaldi",    "deactunit",    "corron",     "worldacclim", "invertdo", "tpshow",     "uishow"};
+  return kReaders.contains(instruction);
+}
 
 Interpreter::Interpreter(const std::vector<SourceFile>& files, const std::vector<Module>& modules)
     : files_(files), modules_(modules), by_name_(modules.size()) {

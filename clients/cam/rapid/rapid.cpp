@@ -885,9 +885,9 @@ class Reader {
 
   /// `FCPressL p10,v50,...`, and procedures of modules that are not there, may be motions.
   void note_unknown(std::size_t m, const Instruction& instruction) {
-    static const std::set<std::string> kStill = {"pdispon",       "eoffson",       "wzhomejointdef", "wzlimjointdef",
-                                                 "mtooltcpcalib", "mtoolrotcalib", "stooltcpcalib",  "stoolrotcalib"};
-    if (kStill.contains(instruction.name)) return;
+    static const std::set<std::string> kTakeTargets = {"wzhomejointdef", "wzlimjointdef", "mtooltcpcalib",
+                                                       "mtoolrotcalib",  "stooltcpcalib", "stoolrotcalib"};
+    if (is_still(instruction.name) || kTakeTargets.contains(instruction.name)) return;
     for (const Expression& argument : instruction.arguments) {
       for (const Scope* scope : meaning_->scopes_of(m, instruction.routine)) {
         const Told<std::vector<Data>> all = meaning_->data_of(*root_of(argument), *scope);
