@@ -315,6 +315,12 @@ TEST(Fanuc, AFrameThatTheProgramChangesAtRunTimeIsLeftWhateverTheRowSays) {
     const test::Corrected made = ls(with_frame("1500", fmt::format("   8:  {} ;\n", line)), frame_at(1.5));
     EXPECT_FALSE(row_of(made.program, "P[1]").corrected()) << line;
   }
+  for (const char* line : {"UFRAME[1]=VR[1].OFFSET", "UFRAME[1]=UFRAME[2]", "UFRAME[1]=PR[R[2]]",
+                           "$MNUFRAME[1,1]=PR[9]", "$MNUFRAME[1,R[1]]=PR[9]"}) {
+    const test::Corrected made =
+        ls(program(fmt::format("   2:  {} ;\n   3:L P[1] 100mm/sec FINE ;\n", line), position(1, kXyz)));
+    EXPECT_FALSE(row_of(made.program, "P[1]").corrected()) << line;
+  }
   const std::string elsewhere = program("   2:  UFRAME[1]=PR[9] ;\n   3:L P[1] 100mm/sec FINE ;\n", position(1, kXyz));
   EXPECT_TRUE(row_of(ls(elsewhere).program, "P[1]").corrected()) << "nothing here says PR[9]: the row does";
 }
@@ -334,11 +340,12 @@ TEST(Fanuc, WhatIsSelectedOnAConditionOrForAnotherGroupIsToldApart) {
   };
   EXPECT_NE(said("IF (DI[1]=ON),UFRAME_NUM=(3)").find("a branch"), std::string::npos);
   EXPECT_NE(said("UFRAME_NUM[GP1]=R[2]").find("is set at run time"), std::string::npos);
+  EXPECT_NE(said("$MNUFRAMENUM[1]=R[2]").find("is set at run time"), std::string::npos);
   EXPECT_NE(said("JMP LBL[R[1]] ;\n   3:  LBL[1]").find("a branch, a jump"), std::string::npos);
   EXPECT_NE(said("WAIT DI[1]=ON TIMEOUT,LBL[1] ;\n   3:  UFRAME_NUM=3 ;\n   3:  LBL[1]").find("a branch"),
             std::string::npos);
-  for (const char* line : {"UFRAME_NUM[GP2]=3", "//UFRAME_NUM=3", "--eg:UFRAME_NUM=3", "UFRAME_NUM=(1)",
-                           "CALL_LOG('UFRAME_NUM=3, Offset')"})
+  for (const char* line : {"UFRAME_NUM[GP2]=3", "$MNUFRAMENUM[2]=3", "//UFRAME_NUM=3", "--eg:UFRAME_NUM=3",
+                           "UFRAME_NUM=(1)", "CALL_LOG('UFRAME_NUM=3, Offset')"})
     EXPECT_EQ(said(line).find("UFRAME_NUM"), std::string::npos) << said(line);
 }
 

@@ -389,6 +389,20 @@ TEST(Krl, WhatARoutineIsHandedIsNothingOfADataListAndMayBeSetByIt) {
     EXPECT_EQ(handed(call, "DEF show(P:IN)\nEND\n").find("may be set"), std::string::npos) << call;
 }
 
+TEST(Krl, RoutinesThatTheFilesLackAreToldWhereTheyMightChangeToolOrBase) {
+  const auto notes = [](const std::string& src) {
+    return fmt::format("{}", fmt::join(krl(src, kFdat).program.notes, "\n"));
+  };
+  const std::string calls = "GRIP_OPEN( )\nIF ($IN[1]) THEN\nPULSE($OUT[1],TRUE,1)\nENDIF\nLIN ";
+  EXPECT_NE(notes(program(calls + kPoint + "\n")).find("GRIP_OPEN: not in the files handed over, taken to leave $TOOL"),
+            std::string::npos)
+      << notes(program(calls + kPoint + "\n"));
+  EXPECT_EQ(notes("DEF p( )\nGRIP_OPEN( )\nFDAT_ACT=FP1\nBAS(#CP_PARAMS,2)\nLIN " + kPoint + "\nEND\n")
+                .find("not in the files"),
+            std::string::npos);
+  EXPECT_EQ(notes(program("LIN " + kPoint + "\n")).find("not in the files"), std::string::npos);
+}
+
 TEST(Krl, AToolThatAnIndexMayChangeIsNotConstant) {
   const test::Corrected tool = krl(program("TOOL_DATA[i]={X 0,Y 0,Z 1,A 0,B 0,C 0}\nLIN " + kPoint + "\n"));
   EXPECT_NE(why(tool, kPoint).find("is set at run time (p.src line 6)"), std::string::npos) << why(tool, kPoint);

@@ -346,13 +346,14 @@ class File {
   /// `UFRAME_NUM=1`, `UTOOL_NUM[GP1]=R[2]`, `IF (DI[1]),UFRAME_NUM=2`
   void select_number(const Pieces& statement, Selected& selected) const {
     const std::size_t at = done_perhaps(statement);
-    const bool frame = statement[at].is("UFRAME_NUM");
-    if (!frame && !statement[at].is("UTOOL_NUM")) return;
+    const bool frame = statement[at].is("UFRAME_NUM") || statement[at].is("$MNUFRAMENUM");
+    if (!frame && !statement[at].is("UTOOL_NUM") && !statement[at].is("$MNUTOOLNUM")) return;
     std::size_t equals = at + 1;
     bool others = false, ours = false;
     for (; equals < statement.size() && !statement[equals].is("="); ++equals) {
       ours |= statement[equals].is("GP1");
       others |= is_group(statement[equals]) && !statement[equals].is("GP1");
+      others |= statement[equals].kind == Piece::Kind::kNumber && !statement[equals].is("1");
     }
     if (equals >= statement.size() || (others && !ours)) return;
     const std::optional<double> constant = constant_at(statement, equals + 1);
@@ -414,6 +415,10 @@ class File {
       const std::string from = indexed(statement, equals + 1);
       Setting& set = controller_.settings.try_emplace(name, Setting{from, where, index_}).first->second;
       if (set.from != from || begin > 0 || name.ends_with("[*]")) set.changed = why;
+    } else if ((word == "$MNUFRAME" || word == "$MNUTOOL") && statement.size() > 4 && statement[2].is("1")) {
+      const bool one = statement[4].kind == Piece::Kind::kNumber;
+      const std::string own = fmt::format("{}[{}]", word.substr(3), one ? statement[4].text : "*");
+      controller_.settings[own].changed = fmt::format("{} is set at run time ({})", word, where);
     } else if (name.starts_with("P[")) {
       const auto position = by_name_.find(name);
       if (position != by_name_.end()) positions_[position->second].changed = why;
@@ -487,7 +492,9 @@ class File {
     if (numbers.size() == 6) return {pose_of(Coordinates::kAnglesXyz, numbers), "", true, set->where};
     const std::string why =
         fmt::format("{} comes from {}, whose value is not constant in the program", name, shown(set->from));
-    return {{}, why, from != nullptr, ""};
+    // What no file says of a register a row may say.
+    const bool open = from == nullptr && set->from.starts_with("PR[") && !set->from.ends_with("[*]");
+    return {{}, why, !open, ""};
   }
 
   [[nodiscard]] static std::string why_not_by_row(const std::string& row, const Pose& X, const Told& told,

@@ -114,6 +114,7 @@ class Reader {
     sites_.finish(program_, [this](const Site& site, ProgramTarget& target) { return describe(site, target); });
     find_order();
     list_unused();
+    note_elsewhere();
     return std::move(program_);
   }
 
@@ -181,8 +182,10 @@ class Reader {
     const std::string& name = tokens[at].text;
     const auto routine =
         std::find_if(routines_.begin(), routines_.end(), [&](const Routine& one) { return one.name == name; });
-    // Functions of the controller in expressions take values; so does BAS( ).
-    if (routine == routines_.end() && (at > 0 || name == "BAS")) return;
+    // Functions of the controller in expressions take values; so do BAS( ) and `IF (`.
+    const bool is_statement = at == 0 && name != "BAS" && step_of(tokens).kind == Step::Kind::kPlain;
+    if (routine == routines_.end() && !is_statement) return;
+    if (routine == routines_.end()) elsewhere_.insert(name);
     std::size_t argument = 0;
     int depth = 0;
     for (std::size_t t = at + 1; t + 1 < tokens.size(); ++t) {
@@ -243,6 +246,21 @@ class Reader {
     const std::size_t end = line.comment.find_first_of(" ;,\t\r", close + 2);
     const std::string number(line.comment.substr(at + 5, close - at - 5));
     tool_names_.emplace(number, std::string(line.comment.substr(close + 2, end - close - 2)));
+  }
+
+  /// Routines that the files lack may do more than they seem to.
+  void note_elsewhere() {
+    static const std::set<std::string> kOfTheController = {
+        "PULSE", "COPEN", "CCLOSE", "CREAD", "CWRITE", "SWRITE", "SREAD", "P00", "CLEAR", "DELETE_BACKWARD_BUFFER"};
+    for (const std::string& name : kOfTheController) elsewhere_.erase(name);
+    if (elsewhere_.empty() || !sets_by_hand_) return;
+    constexpr std::size_t kMost = 5;
+    const std::vector<std::string> all(elsewhere_.begin(), elsewhere_.end());
+    const std::size_t shown_here = std::min(all.size(), kMost);
+    program_.notes.push_back(
+        fmt::format("{}{}: not in the files handed over, taken to leave $TOOL, $BASE and $LOAD as they are",
+                    fmt::join(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(shown_here), ", "),
+                    all.size() > kMost ? fmt::format(" and {} more", all.size() - kMost) : ""));
   }
 
   // What `$machine.dat` says of the robot.
@@ -678,6 +696,7 @@ class Reader {
     const std::string& word = tokens[0].text;
     const bool assigns = tokens.size() > 2 && tokens[1].text == "=";
     std::size_t end = 0;
+    sets_by_hand_ |= word == "$TOOL" || word == "$BASE";
     if (word == "$TOOL" && assigns) {
       state.tool = tool_set(krl::operands_at(tokens, 2, &end), f, k);
     } else if (word == "$BASE" && assigns) {
@@ -1139,7 +1158,9 @@ class Reader {
   krl::Variables names_{program_.files, lines_};
   std::map<std::string, std::string> tool_names_;
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> spline_heads_;  ///< of the lines in a spline block
-  std::string on_rail_;  ///< where an external axis is said to carry the robot; empty: nowhere
+  std::set<std::string> elsewhere_;  ///< routines that are called and not in the files
+  bool sets_by_hand_ = false;        ///< tool or base, for more than one motion
+  std::string on_rail_;              ///< where an external axis is said to carry the robot; empty: nowhere
   std::vector<Load> loads_ = std::vector<Load>(1);
   std::map<std::string, std::size_t> by_name_;  ///< routines
   std::map<std::size_t, Flow> orders_;          ///< of the lines of each routine
