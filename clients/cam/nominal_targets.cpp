@@ -143,7 +143,7 @@ class Finding {
     }
     const bool known = !move.targets.empty() && !move.left_some && from[0].q;
     Stand now = known ? from[0] : move.choice == JointChoice::kOnALine ? line : Stand{};
-    if (!move.axes.empty()) now = {arm_.from_axes(move.axes, {})};
+    if (!known && !move.axes.empty()) now = {arm_.from_axes(move.axes, {})};
     if (stands_[m] == now) return;
     stands_[m] = now;
     changed_ = true;

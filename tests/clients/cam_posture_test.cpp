@@ -291,6 +291,22 @@ TEST(Posture, WhatFollowsAMotionThatIsLeftIsLeftUnlessItSaysItsOwnPosture) {
   EXPECT_TRUE(of_krl("PTP {A1 0,A2 -90,A3 90,A4 0,A5 45,A6 0}\nLIN " + kNext + "}\n", 2).targets.back().q);
 }
 
+TEST(Posture, AxesThatStayAsTheyAreStillSayWhereTheArmStands) {
+  const std::string config =
+      "DEFDAT $CONFIG\nTOOL_DATA[1]={X 0,Y 0,Z 200,A 0,B 0,C 0}\n"
+      "DECL E6AXIS XHOME={A1 0,A2 -90,A3 90,A4 0,A5 45,A6 0}\nENDDAT\n";
+  const std::string src = "DEF p( )\n$TOOL=TOOL_DATA[1]\n$BASE=$NULLFRAME\nPTP XHOME\nLIN " + kNext + "}\nEND\n";
+  const Chain chain = read_robot(TRAMMEL_SOURCE_DIR "/models/kuka_kr210-r2700-extra.yaml").value();
+  const Program program =
+      read_program(Dialect::kKrl, {{"p.src", src}, {"$config.dat", config}}, {.spared = {"$config.dat"}});
+  ASSERT_EQ(program.targets.size(), 1u);
+  Pose X_FT = Pose::Identity();
+  X_FT.translation().z() = 0.2;
+  const auto made = nominal_targets(program, ArmOfProgram(chain), {{{"tool", X_FT}}, {}}, "", "").value();
+  ASSERT_TRUE(made.targets[0].q) << made.targets[0].why_not;
+  EXPECT_GT((*made.targets[0].q)(4), 0);
+}
+
 TEST(Posture, ALineOfKrlKeepsThePostureWhateverItsStatusSays) {
   for (const char* motion : {"LIN ", "SLIN "}) {
     const NominalTargets made = of_krl(kWristUp + motion + kNext + ",S 6,T 27}\n", 2);

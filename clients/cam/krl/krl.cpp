@@ -944,9 +944,7 @@ class Reader {
       return move == moves.end() ? std::nullopt : std::optional<std::size_t>(moves_.at(move->second));
     });
     for (const auto& [step, place] : moves) follow(place.first, place.second, before[step]);
-    for (const auto& [move, axes] : axes_) {
-      if (program_.moves[move].targets.empty()) program_.moves[move].axes = axes;
-    }
+    for (const auto& [move, axes] : axes_) program_.moves[move].axes = axes;
   }
 
   /// Where the program begins, or an interrupt ends what it came in, what a target does not say is taken to be nearest
