@@ -38,7 +38,7 @@ Failure held_elsewhere(ErrorCode code, std::int64_t job, const std::string& serv
 }
 
 /// Refuses where another server that is believed to live works on the job, or on another one of its cell.
-Status check_free(Database& database, const Worker& worker, std::int64_t job, const std::string& cell) {
+Status check_free(Database& database, const Worker& worker, const std::string& cell) {
   if (!database.is_shared()) return {};
   const std::int64_t now = now_of(database);
   auto rows = prepare(database,
@@ -72,7 +72,7 @@ Status claim_job(Database& database, const Worker& worker, std::int64_t job) {
   }();
   lock_cell(database, cell);
   lock_job(database, job);
-  if (const Status free = check_free(database, worker, job, cell); !free) return free;
+  if (const Status free = check_free(database, worker, cell); !free) return free;
   const int begun = change(
       database,
       "UPDATE jobs SET state = 'running', attempts = attempts + 1 WHERE id = $1 AND state IN ('queued', 'running')",

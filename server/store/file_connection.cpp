@@ -13,8 +13,8 @@ constexpr std::chrono::seconds kBetweenTries{1};  // to open a file that cannot 
 
 }  // namespace
 
-FileConnection::StoreConnection(WriterLock writer, StoreFile held, std::string name, OpenedDatabase opened,
-                                std::unique_ptr<ServedCopies> kept)
+FileConnection::FileConnection(WriterLock writer, StoreFile held, std::string name, OpenedDatabase opened,
+                               std::unique_ptr<ServedCopies> kept)
     : StoreConnection(std::move(name), std::move(kept)),
       lock_(std::move(writer)),
       file_(std::move(held)),
@@ -28,7 +28,7 @@ FileConnection::StoreConnection(WriterLock writer, StoreFile held, std::string n
   }
 }
 
-FileConnection::~StoreConnection() {
+FileConnection::~FileConnection() {
   const MutexLock guard(mutex_);
   const auto finding = file_.look();
   if (finding == StoreFile::Finding::kGone || finding == StoreFile::Finding::kAnother) leave_no_journal();
