@@ -74,6 +74,12 @@ class Verdict {
         fmt::format("{} is in use, which does not matter to this check: {}", key, sentence(status.error())));
   }
 
+  /// A database that is away is no problem either: the service starts without it.
+  void add_store(const Status& store) {
+    if (store || store.error().code != ErrorCode::kUnreachable) return add_holdable("store", store);
+    check_.notes.push_back("the store is away, and the service would serve copies: " + sentence(store.error()));
+  }
+
  private:
   const std::string& path_;
   StoreToCheck store_;
@@ -86,13 +92,13 @@ StartCheck check_start(const ServerReading& server, const std::string& path, Sto
   const ServerConfig& config = server.config;
   StartCheck check{server.problems, {}, {}};
   Verdict verdict(path, whose, check);
-  const Status store = config.store.empty() || is_postgres_url(config.store) ? Status() : check_store(config.store);
+  const Status store = config.store.empty() ? Status() : check_store(config.store);
   Status port;
   if (was_read(server, "dds")) port = PortLock::take(config.dds.address, config.dds.port).map([](const PortLock&) {});
   if (is_held(store) && is_held(port)) {
     check.notes.push_back(fmt::format("{}: runs already, it seems: {}", path, sentence(store.error())));
   } else {
-    verdict.add_holdable("store", store);
+    verdict.add_store(store);
     verdict.add_holdable(is_held(port) ? "dds: port" : "dds: address", port);
     const Status http = was_read(server, "http") ? check_http_options(config.http) : Status();
     verdict.add_holdable(is_held(http) ? "http: port" : "http: address", http);
@@ -102,7 +108,8 @@ StartCheck check_start(const ServerReading& server, const std::string& path, Sto
   verdict.add("record: folder", check_records(config.dds.record));
   std::error_code error;
   const bool is_there = store || is_held(store);
-  if (is_there && std::filesystem::exists(config.store, error)) look_at_cells(config, check);
+  const bool has_content = is_postgres_url(config.store) || std::filesystem::exists(config.store, error);
+  if (is_there && has_content) look_at_cells(config, check);
   return check;
 }
 

@@ -203,6 +203,17 @@ TEST_F(StartCheckTest, AStoreThatIsWrittenMeanwhileIsLookedAtAllTheSame) {
   EXPECT_NE(found.notes[0].find("store is in use"), std::string::npos) << found.notes[0];
 }
 
+TEST_F(StartCheckTest, ADatabaseThatIsAwayIsANoteSinceTheServiceStartsWithoutIt) {
+  write_server("", "postgresql://somebody:secret@127.0.0.1:1/plant");
+  const StartCheck found = check();
+  EXPECT_TRUE(found.problems.empty()) << sentence(found.problems.front());
+  ASSERT_EQ(found.notes.size(), 1u);
+  EXPECT_NE(found.notes[0].find("the store is away"), std::string::npos) << found.notes[0];
+  EXPECT_EQ(found.notes[0].find("secret"), std::string::npos);
+  write_server("", "postgresql://somebody:sec%zzret@127.0.0.1/plant");
+  expect_problem("server.yaml", "store");
+}
+
 TEST_F(StartCheckTest, AFolderOfRecordsThatCannotBeMadeIsNamed) {
   write_server("record: {folder: cell-7.yaml/records}\n");
   expect_problem("server.yaml", "record: folder", "cell-7.yaml/records");
