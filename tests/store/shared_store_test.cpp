@@ -5,6 +5,7 @@
 
 #include <map>
 #include <set>
+#include <thread>
 
 #include "server/base/hash.h"
 #include "server/store/store.h"
@@ -133,6 +134,15 @@ TEST_F(SharedStore, ARepeatOnAnotherServerLearnsWhatCameOfTheFirst) {
   EXPECT_EQ(demand(other->rollback("cell-7", 1, id)), 1);
   EXPECT_EQ(demand(other->outcome_of(id))->version, 1);
   EXPECT_EQ(other->outcome_of({"robot-3:17", "something else"}).error().code, ErrorCode::kConflict);
+}
+
+TEST_F(SharedStore, AConnectionThatIsCutIsMadeAnewAndNobodyNotices) {
+  const auto store = open();
+  put_in_force(*store, 1);
+  say("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = 'trammel' AND datname = "
+      "current_database()");
+  EXPECT_TRUE(store->add_batch(batch("lt-07"), job_of("lt-07")));
+  EXPECT_FALSE(store->state().why_not_written);
 }
 
 TEST_F(SharedStore, AnEmptyDatabaseIsRefusedWithTheCommandThatMakesItAStore) {
@@ -270,6 +280,28 @@ TEST_F(SharedStoreAway, ADatabaseThatIsStoppedAndNotDeadIsNoticedByADeadline) {
   EXPECT_FALSE(refused);
   postgres_.freeze(false);
   check_it_comes_back(*store);
+}
+
+TEST_F(SharedStoreAway, ACommitThatTheStandbyHasNotConfirmedIsNoAcknowledgementAndARepeatLearnsWhatCameOfIt) {
+  const auto store = open();
+  const auto standbys = [&](const char* names) {
+    postgres_.sql(url_, fmt::format("ALTER SYSTEM SET synchronous_standby_names = '{}'", names));
+    postgres_.sql(url_, "SELECT pg_reload_conf()");
+  };
+  const std::string waiting = "FROM pg_stat_activity WHERE wait_event = 'SyncRep'";
+  standbys("nobody");
+  Result<StoredJob> unknown;
+  {
+    const std::jthread asks([&] { unknown = store->add_batch(batch("lt-07"), job_of("lt-07")); });
+    while (postgres_.sql(url_, "SELECT count(*) " + waiting) == "0\n") continue;
+    postgres_.sql(url_, "SELECT pg_cancel_backend(pid) " + waiting);
+  }
+  ASSERT_FALSE(unknown) << "the server made it, and on one host alone";
+  EXPECT_EQ(unknown.error().code, ErrorCode::kBusy);
+  EXPECT_NE(unknown.error().message.find("not known"), std::string::npos) << sentence(unknown.error());
+  standbys("");
+  ASSERT_TRUE(store->add_batch(batch("lt-07"), job_of("lt-07")));
+  EXPECT_EQ(demand(store->unfinished_jobs()).size(), 1u);
 }
 
 TEST_F(SharedStoreAway, TheRecordGoesBeforeACopyOfAHistoryThatIsNoMore) {
