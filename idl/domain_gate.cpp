@@ -9,6 +9,7 @@
 #include <charconv>
 #include <chrono>
 #include <fastdds/rtps/common/LocatorList.hpp>
+#include <map>
 #include <string_view>
 #include <utility>
 
@@ -126,6 +127,59 @@ bool any_data(Bytes message, const Found& found) {
   return false;
 }
 
+/// True if the message asks for numbers of what discovery tells of our endpoints.
+bool asks_for_endpoints(Bytes message) {
+  constexpr std::uint32_t kPublications = 0x000003c2, kSubscriptions = 0x000004c2;
+  if (message.size() < kHeader) return false;
+  Bytes rest = message.subspan(kHeader);
+  while (const auto submessage = next_submessage(rest)) {
+    if (submessage->id != kAckNack) continue;
+    Reader body(submessage->body, submessage->little_endian());
+    static_cast<void>(body.entity());  // the reader
+    const auto writer = body.entity();
+    static_cast<void>(body.sequence_number());
+    if (body.u32().value_or(0) > 0 && (writer == kPublications || writer == kSubscriptions)) return true;
+  }
+  return false;
+}
+
+/// Who is being told of our endpoints: where it listens, for as long as the library waits before it repeats a
+/// HEARTBEAT. Thread-safe.
+class Askers {
+ public:
+  using Prefix = LostLeases::Prefix;
+  using Time = LostLeases::Time;
+
+  void announced(const Prefix& prefix, const std::vector<std::uint64_t>& sockets, Time now) {
+    const MutexLock lock(mutex_);
+    if (participants_.size() >= kMost)
+      std::erase_if(participants_, [now](const auto& entry) { return entry.second.until <= now; });
+    if (participants_.size() < kMost || participants_.contains(prefix)) participants_[prefix].sockets = sockets;
+  }
+  void asks(const Prefix& prefix, Time now) {
+    const MutexLock lock(mutex_);
+    const auto who = participants_.find(prefix);
+    if (who != participants_.end()) who->second.until = now + kAsks;
+  }
+  [[nodiscard]] std::vector<std::uint64_t> sockets(Time now) const {
+    const MutexLock lock(mutex_);
+    std::vector<std::uint64_t> asking;
+    for (const auto& [prefix, who] : participants_)
+      if (now < who.until) asking.insert(asking.end(), who.sockets.begin(), who.sockets.end());
+    return asking;
+  }
+
+ private:
+  static constexpr std::size_t kMost = 512;
+  static constexpr std::chrono::milliseconds kAsks{1000};
+  struct Participant {
+    std::vector<std::uint64_t> sockets;
+    Time until{};
+  };
+  mutable Mutex mutex_;
+  std::map<Prefix, Participant> participants_ TRAMMEL_GUARDED_BY(mutex_);
+};
+
 class GateDescriptor;
 
 class Gate final : public rtps::ChainingTransport {
@@ -142,17 +196,21 @@ class Gate final : public rtps::ChainingTransport {
       knows_itself_ = true;
     }
     if (guard_) guard_->sent(Bytes(buffer, size));
-    if (!pace_.lets_out(Bytes(buffer, size))) return true;
-    if (!domain_) return below->send(buffer, size, first, last, limit);
+    // A newcomer asks for the next 256 numbers at each HEARTBEAT: it hears those that the others are spared.
+    const bool to_all = pace_.lets_out(Bytes(buffer, size));
+    if (!domain_) return !to_all || below->send(buffer, size, first, last, limit);
     const LostLeases::Time now = LostLeases::now();
+    const std::vector<std::uint64_t> asking = to_all ? std::vector<std::uint64_t>() : askers_.sockets(now);
+    if (!to_all && asking.empty()) return true;
     leases_.awake(now);
     const std::vector<std::uint64_t> silent = leases_.silent_sockets(now);
     const bool strangers = guard_ && guard_->knows_strangers();
-    if (silent.empty() && !strangers) return below->send(buffer, size, first, last, limit);
+    if (to_all && silent.empty() && !strangers) return below->send(buffer, size, first, last, limit);
     rtps::LocatorList rest;
     for (; *first != *last; ++*first) {
       const std::uint64_t socket = socket_of(**first);
       if (std::find(silent.begin(), silent.end(), socket) != silent.end()) continue;
+      if (!to_all && std::find(asking.begin(), asking.end(), socket) == asking.end()) continue;
       if (!strangers || is_host(socket) || guard_->lets_out(socket)) rest.push_back(**first);
     }
     rtps::Locators begin(rest.begin()), end(rest.end());
@@ -197,6 +255,7 @@ class Gate final : public rtps::ChainingTransport {
     LostLeases::Prefix prefix;
     std::copy_n(message.begin() + kPrefixAt, kPrefix, prefix.begin());
     if (!leases_.lets_in(prefix, now)) return false;
+    if (asks_for_endpoints(message)) askers_.asks(prefix, now);
     any_data(message, [&](const Data& data) {
       if (data.writer != kAnnouncer) return false;
       if (data.payload.empty()) {
@@ -204,6 +263,7 @@ class Gate final : public rtps::ChainingTransport {
         return true;
       }
       Place place = place_of(data.payload);
+      askers_.announced(prefix, place.sockets, now);
       if (place.lease.count() > 0) leases_.announced(prefix, std::move(place.sockets), place.lease, now);
       return true;
     });
@@ -231,6 +291,7 @@ class Gate final : public rtps::ChainingTransport {
   std::vector<std::uint64_t> hosts_;  // their sockets
   HeartbeatPace pace_;
   LostLeases leases_{kLease};
+  Askers askers_;
   std::atomic<bool> knows_itself_{false};
   Mutex mutex_;
   std::array<unsigned char, kPrefix> own_prefix_{};         // written once, before knows_itself_
