@@ -156,7 +156,10 @@ std::optional<Dropped> MessageCheck::check_data(const Submessage& submessage) {
     ignore_end(head->writer, submessage, *number);
     return {};
   }
-  if (!payload && head->writer == kAnnouncer && !received_.relayed) {
+  if ((!payload || says_status) && head->writer == kAnnouncer && !received_.relayed) {
+    // To a reader that nobody has. The library would forget the participant here, while it may be looking in another
+    // thread whether its lease is over: an assertion of PDP.cpp then ends the process.
+    if (!signed_) edited_.put(submessage.body.subspan(4, 4), std::array<unsigned char, 4>{0xff, 0xff, 0xff, 0xff});
     const MutexLock lock(memory_.mutex);
     memory_.participants.left(source_);
     memory_.note_strangers();

@@ -320,6 +320,23 @@ std::vector<int> kinds(const PacketBytes& message) {
   return ids;
 }
 
+// The library's thread that ends leases may be at the same participant: one of both ends the process.
+TEST(Guard, AGoodbyeReachesNoReaderOfTheLibraryAndTheLeaseDecides) {
+  const PacketBytes with_payload =
+      from()
+          .data({0, kAnnouncer, 2, ParameterList().add(0x0071, {0, 0, 0, 3}).bytes(), participant().payload()})
+          .bytes();
+  for (const PacketBytes& message : {goodbye(), goodbye_by_key(kSource), with_payload}) {
+    Guard guard(kMaxTextSample);
+    const PacketBytes passed = let_in(guard, message);
+    ASSERT_EQ(kinds(passed), std::vector<int>{kData});
+    EXPECT_EQ(Reader(Bytes(passed).subspan(kHeader + 8), true).entity(), 0xffffffffu);
+  }
+  Guard guard(kMaxTextSample);
+  EXPECT_EQ(let_in(guard, announcement(participant())).size(), announcement(participant()).size());
+  EXPECT_EQ(Reader(Bytes(announcement(participant())).subspan(kHeader + 8), true).entity(), 0u);
+}
+
 // The library reads who has gone from the inline QoS, and from nowhere else.
 TEST(Guard, WhoSaysByAKeyThatItHasGoneSaysItByAHash) {
   for (const std::uint32_t by : {kAnnouncer, kPublications, kSubscriptions}) {
@@ -338,7 +355,7 @@ TEST(Guard, WhoSaysByAKeyThatItHasGoneSaysItByAHash) {
 
 TEST(Guard, WhereParticipantsProveWhoTheyAreNobodyIsSentAwayWithoutProof) {
   Guard open(kMaxTextSample), secured(kMaxTextSample, nullptr, {}, true);
-  EXPECT_EQ(let_in(open, goodbye()), goodbye());
+  EXPECT_EQ(kinds(let_in(open, goodbye())), std::vector<int>{kData});
   EXPECT_EQ(kinds(let_in(secured, goodbye())), std::vector<int>{kPad});
   const PacketBytes of_writer = ParameterList().guid(0x0070, kSource, kUserWriter).add(0x0071, {0, 0, 0, 3}).bytes();
   const PacketBytes writer_gone = from().data({0, kPublications, 9, of_writer, {}}).bytes();
