@@ -156,10 +156,10 @@ std::string unused(const std::string& name, std::set<std::string>& used) {
 std::string pose_rows(const std::string& part, const Pose& nominal, const Pose& calibrated) {
   std::string text;
   const Vector3 a = nominal.translation() * to_mm(1), b = calibrated.translation() * to_mm(1);
-  const Vector3 ra = roll_pitch_yaw(nominal.linear()) * to_deg(1), rb = roll_pitch_yaw(calibrated.linear()) * to_deg(1);
+  const Vector3 ra = zyx_angles(nominal.linear()) * to_deg(1), rb = zyx_angles(calibrated.linear()) * to_deg(1);
   for (int k = 0; k < 3; ++k) text += row(part, std::string(1, "xyz"[k]), "mm", a(k), b(k), "");
   for (int k = 0; k < 3; ++k)
-    text += row(part, std::array{"roll", "pitch", "yaw"}[static_cast<std::size_t>(k)], "deg", ra(k), rb(k), "");
+    text += row(part, std::array{"roll", "pitch", "yaw"}[static_cast<std::size_t>(k)], "deg", ra(2 - k), rb(2 - k), "");
   return text;
 }
 
