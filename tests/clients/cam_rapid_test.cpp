@@ -245,7 +245,10 @@ TEST(Rapid, WhatIsNoRapidIsLeftAsItIs) {
            "CONST robtarget p:=p;\nMoveL p,v1,fine,t;", std::string(5000, '('), std::string(5000, '['),
            "IF IF IF MoveL", "PROC a()\na;\nENDPROC\nPROC b(robtarget p)\nb p;\nMoveL p,v,z,t;"}) {
     const test::Corrected made = rapid(text);
-    EXPECT_EQ(made.program.files[0].text, text);
+    if (made.refusal.empty())
+      EXPECT_EQ(made.program.files.at(0).text, text);
+    else
+      EXPECT_NE(made.refusal.find("the file is not whole"), std::string::npos) << text.substr(0, 50) << made.refusal;
   }
 }
 
