@@ -719,7 +719,7 @@ class Reader {
     target.rewrites.push_back(std::move(whole));
   }
 
-  // What displacements are measured from. A correction of it would displace what follows the wrong way.
+  // Displacements are measured from some points: a correction of these would displace what follows the wrong way.
 
   /// `PDispOn\ExeP:=pFound,pRef,tGun`: how many of the first arguments are such.
   static std::size_t old_points(const std::string& name) {
@@ -799,7 +799,7 @@ class Reader {
     }
   }
 
-  /// What a field or an element is of; of another expression itself.
+  /// The whole that a field or an element is a part of; another expression itself.
   static const Expression* root_of(const Expression& target) {
     const Expression* root = &target;
     while ((root->kind == Kind::kField || root->kind == Kind::kElement) && !root->parts.empty()) root = &root->parts[0];

@@ -36,7 +36,7 @@ class Parser {
   }
 
  private:
-  /// What an END... is due for.
+  /// It needs an END...
   struct Block {
     std::string word;  ///< in lower case
     std::string called;

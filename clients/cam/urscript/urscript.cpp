@@ -49,7 +49,7 @@ struct Load {
   std::string why_not;
 };
 
-/// What moves the tool away from where motions say, from a function to another.
+/// Moves the tool away from where motions say, from one function to another.
 struct Superposed {
   std::set<std::string_view> begins;
   std::string_view ends;
@@ -72,7 +72,7 @@ struct State {
   bool operator==(const State&) const = default;
 };
 
-/// Whether the axes are commanded, whatever way the tool takes.
+/// The axes are commanded, and the tool may take any way.
 bool is_of_axes(const Piece& piece) { return piece.is("movej") || piece.is("optimovej"); }
 bool is_motion(const Piece& piece) {
   return is_of_axes(piece) || piece.is("movel") || piece.is("movep") || piece.is("movec") || piece.is("optimovel");
