@@ -265,7 +265,7 @@ void Trainer::follow_jobs() {
     const bool is_over = job->state == JobState::kDone || job->state == JobState::kFailed;
     const JobProgress now = stored_progress(*job);
     if (is_over) static_cast<void>(queue_.remove(known.job));
-    if (is_over || now.stage != known.stage) book_.report(now);
+    if (is_over || now.stage != known.stage || now.what != known.what) book_.report(now);
   }
   std::vector<std::string> notices;  // the start of a server says them
   for (const std::int64_t id : *to_take) {
