@@ -308,10 +308,11 @@ class Refusals(unittest.TestCase):
         except ImportError:
             self.skipTest("no pandas here")
         joints = pandas.DataFrame([[10.0 + k, -30, 40, 0, 30, 0] for k in range(4)], columns=[f"q{j}_deg" for j in range(1, 7)])
-        frame = joints.assign(dir2=[1, -1, 1, 0], temperature_c=[20.0, 20.0, 20.0, 31.0])
+        frame = joints.assign(dir2=[1, -1, 1, 0], temperature_c=[20.0, 20.0, 20.0, 31.0],
+                              **{f"dir{j}": 0 for j in (1, 3, 4, 5, 6)})
         each = [self.model.predict(joints.iloc[k], directions=[0, frame.dir2[k], 0, 0, 0, 0], temperature_c=frame.temperature_c[k])
                 for k in range(4)]
-        answer = self.model.predict(frame.assign(**{f"dir{j}": 0 for j in (1, 3, 4, 5, 6)}))
+        answer = self.model.predict(frame)
         np.testing.assert_array_equal(answer.predicted, np.vstack([one.predicted for one in each]))
         np.testing.assert_array_equal(answer.in_domain, np.concatenate([one.in_domain for one in each]))
         poses = dict(zip(("x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"), answer.nominal.T))

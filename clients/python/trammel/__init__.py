@@ -92,16 +92,21 @@ def _in_parts(table: Optional[Table], argument: str, given: Dict[str, Any],
     order = np.concatenate(parts)
     answers = []
     for rows in parts:
-        def of_part(values: Any, least: int = 1, rows: Any = rows) -> Any:
-            if values is None or np.ndim(values) < least or len(values) != len(order):
-                return values
-            return values.iloc[rows] if hasattr(values, "iloc") else np.asarray(values)[rows]
-
         try:
-            answers.append(ask(of_part))
+            answers.append(ask(_taking(rows, len(order))))
         except TrammelError as error:
-            raise error.seen_in(rows) from None
+            raise error.seen_in(rows.tolist()) from None
     return _joined(answers, np.argsort(order))
+
+
+def _taking(rows: npt.NDArray[np.intp], whole_length: int) -> Callable[..., Any]:
+    """Takes `rows` of a value that has as many as the whole; what is one for all stays."""
+    def of_part(values: Any, least: int = 1) -> Any:
+        if values is None or np.ndim(values) < least or len(values) != whole_length:
+            return values
+        return values.iloc[rows] if hasattr(values, "iloc") else np.asarray(values)[rows]
+
+    return of_part
 
 
 def _joined(answers: Sequence[Answer], order: npt.NDArray[np.intp]) -> Answer:
