@@ -73,7 +73,8 @@ class Fleet : public testing::Test {
     const auto all = session.batches("cell-7");
     EXPECT_TRUE(all) << sentence(all.error());
     std::set<std::string> ids;
-    for (const client::BatchOfService& batch : *all) EXPECT_TRUE(ids.insert(batch.id).second) << batch.id << " twice";
+    for (const client::BatchOfService& batch : *all)
+      EXPECT_TRUE(ids.insert(batch.batch).second) << batch.batch << " twice";
     return ids;
   }
 
