@@ -159,7 +159,7 @@ void tell_findings(const Explained& explained, const PreparedBatch& prepared, co
   diagnosis.unexplained = unexplained_of(found, explained.after, explained.all, prepared.surrogates);
   const double left = std::max(remainder.rms, diagnosis.unexplained.rms);
   diagnosis.findings = findings_of(found, explained.after, diagnosis.unexplained, prepared.surrogates, recorded,
-                                   {remainder.more_than_noise, left});
+                                   {remainder.more_than_noise, left, remainder.larger});
   std::vector<SuspectedPose> out;
   for (const Accepted& one : found.accepted) {
     if (one.is_outlier()) out.push_back(one.pose);
