@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <functional>
 #include <set>
-#include <thread>
 
 #include "server/base/text_file.h"
 #include "tests/support/daemon.h"
@@ -24,13 +23,10 @@ const client::CallContext kContext = [] {
   return context;
 }();
 
-/// Until it holds.
+/// Asks until it holds; each time is a call to a server.
 void wait_until(const std::function<bool()>& holds, const char* what) {
   const auto deadline = std::chrono::steady_clock::now() + kLimit;
-  while (!holds()) {
-    ASSERT_LT(std::chrono::steady_clock::now(), deadline) << what;
-    std::this_thread::sleep_for(milliseconds(20));
-  }
+  while (!holds()) ASSERT_LT(std::chrono::steady_clock::now(), deadline) << what;
 }
 
 class Fleet : public testing::Test {
