@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <random>
-#include <thread>
 #include <utility>
 
 #include "server/store/audit_rows.h"
@@ -18,9 +17,9 @@ constexpr std::chrono::seconds kPatience{6};  // for a connection that others us
 constexpr int kMostTries = 5;
 
 /// Longer each time, and not the same for all who were in each other's way.
-void pause(int tries) {
+std::chrono::milliseconds pause_after(int tries) {
   thread_local std::mt19937 random(std::random_device{}());
-  std::this_thread::sleep_for(std::chrono::milliseconds(std::uniform_int_distribution<int>(1, 20 * tries)(random)));
+  return std::chrono::milliseconds(std::uniform_int_distribution<int>(1, 20 * tries)(random));
 }
 
 }  // namespace
@@ -142,7 +141,7 @@ Status SharedConnection::run(const Job& job, Transaction::For what) {
         failed->kind() == DatabaseError::Kind::kAgain && tries < kMostTries && Clock::now() < until;
     const bool was_lost_before = failed->kind() == DatabaseError::Kind::kAway && lost && tries == 1;
     if (!were_in_the_way && !was_lost_before) return told(*failed, lost);
-    pause(tries);
+    wait_without_word({}, Clock::now() + pause_after(tries));
   }
 }
 
