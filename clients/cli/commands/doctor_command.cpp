@@ -20,6 +20,7 @@
 #include "clients/cli/terminal/output.h"
 #include "server/base/part_file.h"
 #include "server/base/plain_text.h"
+#include "server/store/store.h"
 #include "server/store/store_check.h"
 #include "server/store/store_place.h"
 
@@ -193,6 +194,13 @@ Found leftovers(const std::vector<fs::path>& folders) {
           fmt::format("delete them: rm {}", fmt::join(left, " "))};
 }
 
+/// What a change that a server of this record has acknowledged is safe from.
+void look_at_record(const std::string& url, std::vector<Found>& found) {
+  const auto store = Store::open(url);
+  const std::string survives = store ? (*store)->record().survives : "";
+  if (!survives.empty()) found.push_back({"record", State::kGood, "an acknowledged change survives " + survives, ""});
+}
+
 void look_at_store(const std::string& path, std::vector<Found>& found) {
   const Status usable = check_store(path);
   const bool in_use = !usable && usable.error().code == ErrorCode::kConflict;
@@ -203,7 +211,7 @@ void look_at_store(const std::string& path, std::vector<Found>& found) {
     return;
   }
   found.push_back({"store", State::kGood, in_use ? "in use by a server" : "could be opened", ""});
-  if (is_postgres_url(path)) return;  // its disk is another host's
+  if (is_postgres_url(path)) return look_at_record(path, found);  // its disk is another host's
   struct statvfs disk {};
   const fs::path folder = fs::path(path).has_parent_path() ? fs::path(path).parent_path() : fs::path(".");
   if (::statvfs(folder.c_str(), &disk) != 0) return;
