@@ -158,12 +158,14 @@ std::string why_not_connected(PGconn* connection) {
   return "";
 }
 
-/// A server that answered and lets nobody in now will do so later; any other refusal is for good.
-bool is_refused_for_good(PGconn* connection, const std::string& why) {
+/// A server that answered and lets nobody in now will do so later; any other refusal is for good. Of a connection that
+/// is not there libpq has no SQLSTATE, so these are the server's own words.
+bool is_refused_for_good(PGconn* connection, const std::string& told) {
   if (::PQconnectionNeedsPassword(connection) != 0) return true;
-  if (why.find("FATAL:") == std::string::npos) return false;
-  const auto says = [&why](const char* what) { return why.find(what) != std::string::npos; };
-  return !says("starting up") && !says("shutting down") && !says("recovery") && !says("too many") && !says("slots");
+  if (told.find("FATAL:") == std::string::npos) return false;
+  const auto says = [&told](const char* what) { return told.find(what) != std::string::npos; };
+  return !says("starting up") && !says("not yet accepting") && !says("shutting down") && !says("recovery") &&
+         !says("too many") && !says("slots");
 }
 
 /// As the server told when it was connected; a pooler may leave that out.
