@@ -114,14 +114,17 @@ void add_rival(const SingleCause& rival, SeenChange& change) {
   if (!known && !same(change.cause)) change.could_also_be.push_back(rival);
 }
 
-/// An instrument that tells all lengths too long is like an arm that grew.
-void tell_instrument(SeenChange& change) {
+/// An instrument that tells all lengths too long is like an arm that grew, and the tool with it.
+void tell_instrument(std::vector<SeenChange>& changed) {
+  const auto grew = std::find_if(changed.begin(), changed.end(),
+                                 [](const SeenChange& change) { return change.cause.record->needs.temperature; });
+  if (grew == changed.end()) return;
   for (const CauseRecord* record : all_causes()) {
     const bool is_rival = std::any_of(record->rivals.begin(), record->rivals.end(), [&](const causes::Rival& rival) {
-      return rival.cause == change.cause.record->spelling;
+      return rival.cause == grew->cause.record->spelling;
     });
-    if (is_rival && record->scope == causes::Scope::kSession && !record->needs.time)
-      add_rival({record, -1, {}, false}, change);
+    if (!is_rival || record->scope != causes::Scope::kSession || record->needs.time) continue;
+    for (SeenChange& change : changed) add_rival({record, -1, {}, false}, change);
   }
 }
 
@@ -312,6 +315,7 @@ void Examination::tell_what_is_left() {
   const RefittedRows named(rows_.covariance, nuisance_);
   const double left = named.left(rows_.residual).squaredNorm();
   const int numbers = RefittedRows(rows_.covariance, always_).freedom() - named.freedom();
+  tell_instrument(check_.changed);
   for (SeenChange& change : check_.changed) {
     tell_several_zeros(left, numbers, change);
     if (!is_all) add_rival(unknown_cause(), change);
@@ -660,7 +664,6 @@ void Examination::tell_rivals(std::size_t hypothesis, const CheckTests& tests, c
     const bool as_much = !other.any_function && explained(h) > explained(hypothesis) - kAlike;
     if (h != hypothesis && (as_much || likely[h] || scores[h] > scores[hypothesis] - kAlike)) add_rival(other, change);
   }
-  if (change.cause.record->needs.temperature) tell_instrument(change);
   if (!change.cause.any_function) return;
   for (const causes::Rival& rival : change.cause.record->rivals) {
     const CauseRecord* record = find_cause(rival.cause);

@@ -342,12 +342,12 @@ TEST_F(HealthTest, LengthsThatAreAllTooLongAreAWarmArmOrTheInstrumentAndNoLink) 
     for (Measurement& m : batch.measurements) m.p_W *= 1 + 2e-4;
     const HealthCheck check =
         check_health(robot_->model, check_against_cell(batch, cell).value(), tolerance_mm(0.05)).value();
-    ASSERT_EQ(check.changed.size(), 1u) << check.sentence;
-    const SeenChange& change = check.changed.front();
-    EXPECT_EQ(change.cause.record->spelling, "thermal_growth") << check.sentence;
-    EXPECT_TRUE(std::any_of(change.could_also_be.begin(), change.could_also_be.end(), [](const SingleCause& other) {
-      return other.record->spelling == "instrument_scale";
-    })) << check.sentence;
+    ASSERT_FALSE(check.changed.empty()) << check.sentence;
+    EXPECT_EQ(check.changed.front().cause.record->spelling, "thermal_growth") << check.sentence;
+    for (const SeenChange& change : check.changed)
+      EXPECT_TRUE(std::any_of(change.could_also_be.begin(), change.could_also_be.end(), [](const SingleCause& other) {
+        return other.record->spelling == "instrument_scale";
+      })) << check.sentence;
   }
 }
 
