@@ -114,12 +114,15 @@ Result<Stand> base_of(const MeasurementBatch& batch, const std::vector<ErrorPred
       "elsewhere than in the model: measure poses that are spread over the workspace (`trammel plan --check`)");
 }
 
-/// The base is no more turned than by kTurned, about where the poses were measured.
+/// The base is no more turned than by kTurned, about the mean of where the poses were measured: its place is refitted.
 void hold_turn(CheckRows& rows) {
+  const auto measured_B = [&](std::size_t i) {
+    return Vector3(rows.predicted[i].translation() + rows.residual.segment<3>(rows.first[i]));
+  };
+  Vector3 mean = Vector3::Zero();
+  for (std::size_t i = 0; i < rows.poses(); ++i) mean += measured_B(i) / static_cast<double>(rows.poses());
   Eigen::MatrixXd by_turn(rows.residual.size(), 3);
-  for (std::size_t i = 0; i < rows.poses(); ++i)
-    by_turn.middleRows<3>(rows.first[i]) =
-        -skew(rows.predicted[i].translation() + rows.residual.segment<3>(rows.first[i]));
+  for (std::size_t i = 0; i < rows.poses(); ++i) by_turn.middleRows<3>(rows.first[i]) = -skew(measured_B(i) - mean);
   rows.covariance += kTurned * kTurned * by_turn * by_turn.transpose();
   rows.by_base = Eigen::MatrixXd(rows.by_base.leftCols<3>());
 }
