@@ -38,6 +38,7 @@ using health::ZerosSearch;
 constexpr int kMostCauses = 3;          // that a check may name
 constexpr int kRounds = 3;              // of looking at each of them again beside the others
 constexpr double kAlike = 6;            // of scores: odds of e^3
+constexpr double kEven = 1e-3;          // of scores: rounding
 constexpr double kCredible = 0.99;      // of all single causes' odds: those that could be it have it together
 constexpr double kUnlinear = 0.003;     // of an effect
 constexpr double kDoubtful = 0.02;      // chance from which on nothing is said for certain
@@ -509,6 +510,9 @@ std::size_t Examination::most_explained(const CheckTests& tests, const Eigen::Ve
 std::optional<std::size_t> Examination::likeliest(const CheckTests& tests, const Eigen::VectorXd& left) const {
   std::vector<double> scores = tests.scores(left);
   scores.resize(questions_.causes);
+  // Of a joint that stays at one angle anything over that angle acts like its zero, which is simpler.
+  for (std::size_t h = 0; h < scores.size(); ++h)
+    if (is_zero(effects_.causes()[questions_.hypotheses[h].cause].cause)) scores[h] += kEven;
   while (!scores.empty()) {
     const auto best = std::max_element(scores.begin(), scores.end());
     const auto hypothesis = static_cast<std::size_t>(best - scores.begin());
