@@ -510,7 +510,7 @@ std::size_t Examination::most_explained(const CheckTests& tests, const Eigen::Ve
 std::optional<std::size_t> Examination::likeliest(const CheckTests& tests, const Eigen::VectorXd& left) const {
   std::vector<double> scores = tests.scores(left);
   scores.resize(questions_.causes);
-  // Of a joint that stays at one angle anything over that angle acts like its zero, which is simpler.
+  // Where a joint stays at one angle, anything over that angle acts like its zero, which is simpler.
   for (std::size_t h = 0; h < scores.size(); ++h)
     if (is_zero(effects_.causes()[questions_.hypotheses[h].cause].cause)) scores[h] += kEven;
   while (!scores.empty()) {
