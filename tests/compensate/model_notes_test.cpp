@@ -133,7 +133,7 @@ TEST(ModelNotes, AStatedSigmaOfMoreThanTwiceWhatIsLeftIsSaidToHideTheArmsErrors)
 TEST(ModelNotes, WhatIsLeftOfDistancesAndTouchesIsHeldAgainstTheStatedSigma) {
   const auto left = [](double times) {
     CompensatedModel::Parts parts = model_of({"base", "geometry"}, kHeavy).parts();
-    parts.training.gauges = GaugeFigures{.rows = 60};
+    parts.training.gauges.emplace().rows = 60;
     parts.discrepancy = parts.training.gauges->compensated = times * parts.physics.cell->tracker.sigma;
     std::vector<Note> notes = notes_of(test::demand(CompensatedModel::make(parts)));
     std::erase_if(notes, [](const Note& note) { return note.code != "left_over_sigma"; });
