@@ -215,6 +215,17 @@ int watch(CaughtSignals& signals, const Serving& serving) {
   }
 }
 
+void tell_ready(const ServerConfig& config) {
+  const std::string pages =
+      config.http.port == 0 ? "" : fmt::format(", pages on http://{}:{}", config.http.address, config.http.port);
+  const std::string serves = config.serves ? fmt::format("serves {} cells on {}:{}, domain {}", config.cells.size(),
+                                                         config.dds.address, config.dds.port, config.dds.domain)
+                                           : fmt::format("trains {} cells", config.cells.size());
+  tell(LogLevel::kInfo, "ready",
+       fmt::format("ready: {} {}, store {}{}", config.dds.server_id, serves, spoken_place(config.store), pages));
+  tell_manager_ready("serves");
+}
+
 /// Starts to answer; returns the server's name, which is its own for as long as that is held.
 Result<PortLock> open_to_clients(const DdsOptions& options, DdsService& service) {
   // A second copy of this server is told about the port first.
@@ -274,13 +285,7 @@ Status serve(ServerConfig config, const Arguments& arguments) {
   }
   if (const auto started = trainer.start(); !started) return tl::make_unexpected(started.error());
   http.set_phase(ServerPhase::kServing);
-  const std::string pages =
-      config.http.port == 0 ? "" : fmt::format(", pages on http://{}:{}", config.http.address, config.http.port);
-  tell(LogLevel::kInfo, "ready",
-       fmt::format("ready: {} serves {} cells on {}:{}, domain {}, store {}{}", config.dds.server_id,
-                   config.cells.size(), config.dds.address, config.dds.port, config.dds.domain,
-                   spoken_place(config.store), pages));
-  tell_manager_ready("serves");
+  tell_ready(config);
 
   const int ended_by = watch(signals, {config, arguments, service, trainer, registry});
   tell(LogLevel::kInfo, "stopping", fmt::format("stopping: {}", ::strsignal(ended_by)));

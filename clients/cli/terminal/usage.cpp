@@ -217,7 +217,10 @@ std::optional<Error> unknown_word(const CLI::App& app, const std::vector<std::st
   }
   if (command == nullptr) return unknown_command(app, words[0]);
   for (std::size_t k = 1; k < words.size() && words[k] != "--"; ++k) {
-    if (!is_option(words[k])) continue;
+    if (!is_option(words[k])) {
+      if (const CLI::App* inner = command_of(*command, words[k])) command = inner;  // `store init`
+      continue;
+    }
     const bool is_long = words[k].starts_with("--");
     const std::string name = is_long ? words[k].substr(0, words[k].find('=')) : words[k].substr(0, 2);
     if (command->get_option_no_throw(name) == nullptr) return unknown_option(*command, words[k]);
