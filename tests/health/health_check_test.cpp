@@ -308,7 +308,7 @@ TEST_F(HealthTest, PosesAtOnePlaceWithoutOrientationsCannotTell) {
 }
 
 TEST_F(HealthTest, WhereTwoZerosExplainMoreThanOneTheCheckIsNotSureOfOneAlone) {
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     const HealthCheck check =
         checked(*robot_, {{zero_off(*robot_, 2, 4e-5), zero_off(*robot_, 3, -4e-5)}}, seed, tolerance_mm(0.05));
     if (!test::is_sure(check) || check.changed.front().zeros.size() != 1) continue;
@@ -322,7 +322,7 @@ TEST_F(HealthTest, AnInstrumentThatMeasuresWorseThanItsSigmaSaysIsNoChangeOfTheR
   hidden::Random random(13);
   std::normal_distribution<double> normal;
   int changed = 0;
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     MeasurementBatch batch = test::measured_check(*robot_, {}, seed);
     for (Measurement& m : batch.measurements) {
       m.p_W += 25e-6 * Vector3(normal(random), normal(random), normal(random));  // twice the stated sigma in all
@@ -332,7 +332,7 @@ TEST_F(HealthTest, AnInstrumentThatMeasuresWorseThanItsSigmaSaysIsNoChangeOfTheR
         check_health(robot_->model, check_against_cell(batch, cell).value(), tolerance_mm(0.05)).value();
     changed += check.verdict == HealthVerdict::kChanged ? 1 : 0;
   }
-  EXPECT_LE(changed, 3);
+  EXPECT_LE(changed, 1);
 }
 
 TEST_F(HealthTest, LengthsThatAreAllTooLongAreAWarmArmOrTheInstrumentAndNoLink) {

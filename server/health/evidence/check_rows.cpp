@@ -20,7 +20,7 @@ constexpr double kFarOff = 6;      // times the median: a pose that does not say
 constexpr int kLocalisations = 4;  // without the poses that were far off the last time
 constexpr double kThin = 0.02;     // of how far the poses are away: within less of a line they turn the base anyhow
 constexpr double kJitter = 1e-6;   // of the instrument's variance: what is certain is so to rounding
-constexpr double kUnmoved = 0.1;   // of how far the poses are away: lost zeros move them no farther
+constexpr double kUnmoved = 0.02;  // of how far the poses are away: a zero of a degree moves them no farther
 constexpr double kTurned = 0.002;  // rad: of a base that is turned as the model has it
 
 double median(std::vector<double> values) {
