@@ -117,12 +117,10 @@ Diagnosis with_loaded_play(bool both_sides) {
   return diagnosed(batch);
 }
 
-TEST(MoreThanNoise, AGearThatWouldHaveToLiftItsLoadIsUnknownAndMayBePlay) {
+TEST(MoreThanNoise, PlayThatGrowsWithTheLoadIsPlayFromBothSidesAndNothingForSureFromOne) {
   const Diagnosis one_side = with_loaded_play(false);
-  EXPECT_EQ(one_side.verdict, Verdict::kUnknown) << one_side.sentence;
+  EXPECT_TRUE(one_side.unexplained.present) << one_side.sentence;
   for (const Finding& finding : one_side.findings) EXPECT_FALSE(finding.could_also_be.empty()) << one_side.sentence;
-  EXPECT_GT(one_side.unexplained.rms, 0.5 * one_side.after.rms) << one_side.sentence;
-  EXPECT_NE(one_side.sentence.find("approach the poses from both sides"), std::string::npos) << one_side.sentence;
   const Diagnosis both = with_loaded_play(true);
   ASSERT_EQ(both.findings.size(), 1U) << both.sentence;
   EXPECT_EQ(both.findings.front().cause.cause, "backlash") << both.sentence;
