@@ -43,7 +43,7 @@ TEST(EvaluationJson, HasAnOrientationInDegreesWhereOneWasMeasuredAndSoHasTheText
 TEST(EvaluationJson, TellsDistancesByThemselvesAndNoFigureOfPositionsWhereNoneWasMeasured) {
   Evaluation wires;
   wires.nominal = wires.calibrated = wires.compensated = no_figures();
-  wires.gauges = {12, 3e-3, 6e-5, 5e-5, 1e-4, .9, 11};
+  wires.gauges = {12, 3e-3, 6e-5, 5e-5, 1e-4, .9, 11, {}};
   const auto alone = evaluation_json(wires);
   EXPECT_FALSE(alone.contains("rms_mm"));
   EXPECT_FALSE(alone.contains("levels"));
