@@ -115,7 +115,7 @@ FramesRows rows_of(const Program& program) {
     if (!tool.row.empty()) (tool.X_FT ? rows.used : rows.open).insert(tool.row);
   }
   for (const ProgramFrame& frame : program.frames) {
-    if (!frame.row.empty()) (frame.why_not.empty() ? rows.used : rows.open).insert(frame.row);
+    if (!frame.row.empty()) (frame.why_not.empty() || frame.in_base ? rows.used : rows.open).insert(frame.row);
   }
   rows.used.insert(kRobotBase);
   return rows;

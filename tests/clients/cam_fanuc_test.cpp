@@ -299,6 +299,11 @@ TEST(Fanuc, ARowOfFramesThatContradictsWhatTheProgramSetsLeavesThePointWithBothV
       << why(ls(tool), "P[1]");
 }
 
+TEST(Fanuc, ARowThatIsContradictedIsNoRowThatNothingUses) {
+  const Program read = read_program(Dialect::kFanuc, {{"p1.ls", with_frame("1500")}}, frame_at(1.5025));
+  EXPECT_TRUE(rows_of(read).used.contains("UFRAME[1]"));
+}
+
 TEST(Fanuc, AProgramsFrameIsHeldAgainstARowAsTheRobotStandsInTheWorld) {
   ReadOptions read = frame_at(1.5);
   read.frames.emplace("robot_base", make_pose(Matrix3::Identity(), {0, 0, .8}));
