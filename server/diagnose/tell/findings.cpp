@@ -24,6 +24,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+constexpr std::ptrdiff_t kMostAccidents = 3;  // poses that are out beside something unexplained
 constexpr Index kBlocksOfHalves = 16;  // of poses one after the other, taken by turns: each half has all of the day
 
 /// The joint estimate of everything, about the model's values, in units of priors.
@@ -183,6 +184,7 @@ class Findings {
   Folds folds_;
   VectorXd held_out_;
   std::vector<FamilyPtr> families_;     // none where nothing begins at a pose
+  bool more_than_accidents_ = false;    // are out
   bool several_beyond_others_ = false;  // poses that are out stand beyond all others
 };
 
@@ -212,6 +214,8 @@ Findings::Findings(const SearchResult& found, const LinearProblem& problem, cons
       folds_(problem, columns_),
       held_out_(folds_.held_out_residual(problem.residual())) {
   if (std::any_of(found.accepted.begin(), found.accepted.end(), begins)) families_ = make_families(problem);
+  more_than_accidents_ = std::count_if(found.accepted.begin(), found.accepted.end(),
+                                       [](const Accepted& one) { return one.is_outlier(); }) > kMostAccidents;
   several_beyond_others_ = std::count_if(found.accepted.begin(), found.accepted.end(), [this](const Accepted& one) {
                              return one.is_outlier() && is_beyond_others(one);
                            }) > 1;
@@ -236,8 +240,9 @@ Finding Findings::outlier(const Accepted& one) const {
 }
 
 bool Findings::may_show_what_lacks(const Accepted& one) const {
-  if (is_beyond_others(one)) return beside_.more_than_noise || several_beyond_others_;
-  return beside_.more_than_noise && one.pose.distance < thresholds::kFarOut * beside_.left;
+  if (several_beyond_others_ && is_beyond_others(one)) return true;
+  return beside_.more_than_noise &&
+         (more_than_accidents_ || is_beyond_others(one) || one.pose.distance < thresholds::kFarOut * beside_.left);
 }
 
 /// Whether the pose lies beyond all others in some way, where nothing says what the arm does.
