@@ -153,8 +153,8 @@ TEST_F(Ros2Service, ANodeWhoseReaderIsMatchedAfterItsQuestionIsAnswered) {
 TEST_F(Ros2Service, WhatOneNodeAsksAnotherOneHears) {
   Node mute(options_, false);
   ASSERT_TRUE(mute.wait_until_heard());
-  mute.ask(question("for all"));
-  EXPECT_EQ(node_.wait_for_answers(1)[0].id(), "for all");
+  mute.ask(question("for/all"));
+  EXPECT_EQ(node_.wait_for_answers(1)[0].id(), "for/all");
 }
 
 TEST_F(Ros2Service, EachQuestionOfAFloodIsAnsweredOnceAndWhatHasNoRoomIsToldSo) {
