@@ -48,8 +48,8 @@ void add_apply_commands(CLI::App& app, Action& chosen);        // predict, corre
 void add_backup_command(CLI::App& app, Action& chosen);        // import-backup
 void add_store_backup_command(CLI::App& app, Action& chosen);  // backup
 void add_store_command(CLI::App& app, Action& chosen);
-void add_robot_command(CLI::App& app, Action& chosen);         // export-robot
-void add_confirm_command(CLI::App& app, Action& chosen);       // confirm-robot
+void add_robot_command(CLI::App& app, Action& chosen);    // export-robot
+void add_confirm_command(CLI::App& app, Action& chosen);  // confirm-robot
 void add_doctor_command(CLI::App& app, Action& chosen);
 /// help, completion, manual: of `app` as it is when they run; it outlives `chosen`.
 void add_help_commands(CLI::App& app, Action& chosen);
