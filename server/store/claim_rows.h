@@ -25,7 +25,8 @@ struct Worker {
 /// Sets the job running, claims it for the worker and counts an attempt. Refuses (kNotFound) one that is over,
 /// (kConflict) one of a cell that another server works for.
 [[nodiscard]] Status claim_job(Database& database, const Worker& worker, std::int64_t job);
-/// Refuses (kNotFound) a running job that another worker has claimed, also where that one is dead.
-[[nodiscard]] Status check_held(Database& database, const Worker& worker, std::int64_t job);
+/// Refuses (kNotFound) a running job that another worker has claimed, also where that one is dead. `also_waiting`: for
+/// results, which only the last worker has: one that put the job back, too.
+[[nodiscard]] Status check_held(Database& database, const Worker& worker, std::int64_t job, bool also_waiting = false);
 
 }  // namespace trammel

@@ -56,12 +56,13 @@ Worker new_worker() {
   return {"", fmt::format("{:08x}{:08x}{:08x}{:08x}", random(), random(), random(), random())};
 }
 
-Status check_held(Database& database, const Worker& worker, std::int64_t job) {
+Status check_held(Database& database, const Worker& worker, std::int64_t job, bool also_waiting) {
   if (!database.is_shared()) return {};  // whoever else held a job of this file is gone
   lock_job(database, job);
   const auto claim = claim_of(database, job);
   if (!claim || claim->token == worker.token) return {};
-  if (!exists(database, "SELECT 1 FROM jobs WHERE id = $1 AND state = 'running'", job)) return {};
+  const bool runs = exists(database, "SELECT 1 FROM jobs WHERE id = $1 AND state = 'running'", job);
+  if (!runs && !also_waiting) return {};
   return held_elsewhere(ErrorCode::kNotFound, job, claim->server);
 }
 
@@ -82,7 +83,7 @@ Status claim_job(Database& database, const Worker& worker, std::int64_t job) {
   change(database,
          "INSERT INTO job_claims (job, server, token, lease_until, cancelled_by) VALUES ($1, $2, $3, $4, NULL) "
          "ON CONFLICT (job) DO UPDATE SET server = excluded.server, token = excluded.token, "
-         "lease_until = excluded.lease_until, cancelled_by = NULL",
+         "lease_until = excluded.lease_until",
          job, worker.server, worker.token, now_of(database) + kLease.count());
   return {};
 }
@@ -123,8 +124,7 @@ Result<std::set<std::int64_t>> Store::jobs_to_take() const {
     auto rows = prepare(database,
                         "SELECT id FROM jobs WHERE state IN ('queued', 'running') AND NOT EXISTS "
                         "(SELECT 1 FROM jobs AS other JOIN job_claims ON job = other.id WHERE other.cell = jobs.cell "
-                        "AND other.state = 'running' AND (other.id = jobs.id OR token <> $1) "
-                        "AND (token = $1 OR lease_until > $2))",
+                        "AND other.state = 'running' AND (other.id = jobs.id OR token <> $1) AND lease_until > $2)",
                         connection_->worker.token, now_of(database));
     std::set<std::int64_t> jobs;
     while (rows.next()) jobs.insert(rows.integer64(0));

@@ -117,6 +117,7 @@ JobRunner::Attempt JobRunner::attempt(std::int64_t id, const StopRequests& stop)
     const bool elsewhere = running.error().code == ErrorCode::kConflict;
     return tl::make_unexpected(Failed{running.error(), verdict_of(running.error()), false, {}, elsewhere});
   }
+  lost_ = false;
   claimed_ = id;
   book_.report(progress_at(*job, JobStage::kTraining));
   std::optional<StoredDiagnosis> asked;
@@ -281,7 +282,7 @@ JobRunner::Attempt JobRunner::finish(const StoredJob& job, const Made& made, con
 
 JobRunner::End JobRunner::end(std::int64_t id, const Failed& failed, const StopRequests& stop,
                               const CancelledBy& cancelled_by) {
-  if (failed.elsewhere) return End::kElsewhere;
+  if (failed.elsewhere || lost_) return End::kElsewhere;
   auto stored = store_.job(id);
   StoredJob job;
   job.id = id;
@@ -289,6 +290,10 @@ JobRunner::End JobRunner::end(std::int64_t id, const Failed& failed, const StopR
   const bool cancelled = stop.job.stop_requested();
   if (stop.service.stop_requested() && !cancelled) return put_back(job, job.message, false, stop);
   const std::string why = sentence(failed.error);
+  // A record that was away or locked for a moment ends no job. If its result was taken all the same, the next attempt
+  // finds that it is over.
+  if (store_.is_shared() && failed.error.code == ErrorCode::kBusy && !cancelled)
+    return put_back(job, fmt::format("{}; it is tried again", why), false, stop);
   if (!cancelled && failed.again && job.attempts < kMaxAttempts)
     return put_back(job, fmt::format("{}; it is tried again ({} of {})", why, job.attempts + 1, kMaxAttempts), true,
                     stop);

@@ -232,9 +232,10 @@ void Trainer::take_up_jobs(std::vector<StoredJob> jobs, std::vector<std::string>
 void Trainer::follow(std::int64_t followed, const std::stop_token& stop) {
   ::pthread_setname_np(::pthread_self(), "follower");
   while (!stop.stop_requested()) {
-    followed = follow_models(followed);
-    follow_jobs();
     keep_claim();
+    followed = follow_models(followed);
+    keep_claim();
+    follow_jobs();
     store_.wait_for_change(stop, kFollowTick);
   }
 }
@@ -248,10 +249,12 @@ std::int64_t Trainer::follow_models(std::int64_t followed) {
                       false);
   const auto changed = store_.cells_changed_after(lost ? 0 : followed);
   if (!changed) return followed;
+  bool all = true;
   for (const std::string& cell : *changed) {
-    if (cells().contains(cell)) history_.follow(cell);
+    if (cells().contains(cell) && !history_.follow(cell)) all = false;
+    keep_claim();  // a record that answers slowly must not end the lease
   }
-  return *made;
+  return all ? *made : followed;
 }
 
 void Trainer::follow_jobs() {
@@ -282,6 +285,7 @@ void Trainer::keep_claim() {
   if (job == 0) return;
   const auto claim = store_.renew_claim(job);
   if (!claim) return;  // a record that is away lets nobody else claim it, either
+  if (!claim->is_held) runner_.lose_claim();
   if (!claim->is_held || claim->cancelled_by) static_cast<void>(queue_.cancel(job, claim->cancelled_by.value_or("")));
 }
 

@@ -104,6 +104,34 @@ TEST_F(Claims, AServerThatWasNotHeardOfLosesItsJobAndStoresNothingOfItAfterwards
   EXPECT_EQ(demand(one_->models("cell-7")).size(), 1U);
 }
 
+TEST_F(Claims, WhoLostAJobThatWasPutBackSinceStoresNothingOfIt) {
+  const std::int64_t job = submit("cell-7", "b1");
+  ASSERT_TRUE(one_->set_job_running(job));
+  let_lease_pass(job);
+  ASSERT_TRUE(other_->set_job_running(job));
+  ASSERT_TRUE(other_->set_job_queued(job)) << "it stops, and the job waits";
+  EXPECT_EQ(add_model(*one_, job), 0) << "it slept meanwhile";
+  EXPECT_EQ(one_->set_job_done(job, "late").error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(demand(one_->job(job)).state, JobState::kQueued);
+}
+
+TEST_F(Claims, AJobThatWasToEndEndsAlsoWhereItsServerIsGone) {
+  const std::int64_t job = submit("cell-7", "b1");
+  ASSERT_TRUE(one_->set_job_running(job));
+  ASSERT_TRUE(other_->ask_to_cancel(job, "anna"));
+  let_lease_pass(job);
+  ASSERT_TRUE(other_->set_job_running(job));
+  EXPECT_EQ(demand(other_->renew_claim(job)).cancelled_by, "anna");
+}
+
+TEST_F(Claims, AServerTakesUpItsOwnJobThatItLeftBehind) {
+  const std::int64_t job = submit("cell-7", "b1");
+  ASSERT_TRUE(one_->set_job_running(job));
+  EXPECT_TRUE(demand(one_->jobs_to_take()).empty()) << "it works on it";
+  let_lease_pass(job);
+  EXPECT_TRUE(demand(one_->jobs_to_take()).contains(job));
+}
+
 TEST_F(Claims, WhoRunsAJobHearsThatAnotherServerWasAskedToEndIt) {
   const std::int64_t job = submit("cell-7", "b1");
   EXPECT_EQ(other_->ask_to_cancel(job, "anna").error().code, ErrorCode::kConflict) << "nobody works on it";

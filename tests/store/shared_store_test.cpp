@@ -199,6 +199,10 @@ TEST_F(SharedStore, ARoleThatMayOnlyUseItCannotChangeTheAuditTrail) {
 TEST_F(SharedStore, NoErrorHoldsThePasswordOrAValue) {
   const std::string secret = "postgresql://somebody:s3cret@127.0.0.1:1/plant?connect_timeout=1";
   EXPECT_EQ(spoken_place(secret), "postgresql://somebody@127.0.0.1:1/plant");
+  EXPECT_EQ(spoken_place("postgresql://host/db?password=p@ss"), "postgresql://host/db");
+  EXPECT_EQ(spoken_place("postgresql://u:x@host/db?password=p@ss"), "postgresql://u@host/db");
+  EXPECT_EQ(spoken_place("postgresql://host?password=p@ss/db").find("p@"), std::string::npos);
+  EXPECT_EQ(spoken_place("postgresql://host?password=p@ss/db").find("=p"), std::string::npos);
   const auto store = demand(Store::open(secret, folder_.file("none")));
   ASSERT_TRUE(store->state().why_not_written);
   EXPECT_EQ(sentence(*store->state().why_not_written).find("s3cret"), std::string::npos);

@@ -148,15 +148,20 @@ Status ModelHistory::activate(const std::string& cell, int version, const Change
   return {};
 }
 
-void ModelHistory::follow(const std::string& cell) {
+Status ModelHistory::follow(const std::string& cell) {
+  const MutexLock lock(changes_of(cell));  // what this server decides meanwhile is published before it is compared
   const auto decided = store_.version_in_force(cell);
-  if (!decided || !*decided || **decided == registry_.version_in_force(cell)) return;
+  if (!decided) return tl::make_unexpected(decided.error());
+  if (!*decided || **decided == registry_.version_in_force(cell)) return {};
   auto model = registry_.version(cell, **decided);
-  const MutexLock lock(changes_of(cell));
-  const auto now = store_.version_in_force(cell);
-  if (!now || *now != *decided || **now == registry_.version_in_force(cell)) return;  // that change is followed next
-  if (!model) return registry_.announce(cell, **now);  // whoever asks for it hears why it is not served
+  if (!model) {
+    registry_.announce(cell, **decided);  // whoever asks for it hears why it is not served
+    if (model.error().code == ErrorCode::kBusy) return tl::make_unexpected(model.error());
+    return {};
+  }
   put_in_force(std::move(*model));
+  static_cast<void>(store_.copy_model_in_force(cell));  // to start from while the record is away
+  return {};
 }
 
 Result<ModelHistory::WayBack> ModelHistory::way_back(const std::string& cell) const {
@@ -304,7 +309,7 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate, const Judging& judgi
   const std::string& cell = candidate.job.cell;
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
     if (stop.stop_requested()) return failure(ErrorCode::kBusy, "the service stops");
-    if (store_.is_shared()) follow(cell);
+    if (store_.is_shared()) static_cast<void>(follow(cell));  // else the store refuses what was judged beside another
     // Judging takes a while: nobody waits for it. Where somebody changed what is in force meanwhile, it is done again.
     const auto present = registry_.in_force(cell);
     const int version = present ? present->version : 0;

@@ -95,7 +95,8 @@ class ModelHistory {
   [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text, const ChangeId& id = {});
 
   /// Serves the cell with the version that the store has in force: another server may have put it there.
-  void follow(const std::string& cell);
+  /// An error: that is not known, or it cannot be read now.
+  Status follow(const std::string& cell);
 
   /// What another server decides: false, and nothing goes in force here but by adopt(). At the start: true.
   void set_decides(bool decides) { decides_ = decides; }
