@@ -26,7 +26,8 @@ Result<std::unique_ptr<Database>> open_url(const std::string& url) {
 Result<std::unique_ptr<Database>> open_to_read(const std::string& place) {
   if (is_postgres_url(place)) return open_url(place);
   std::error_code error;
-  if (!std::filesystem::exists(place, error)) return failure(ErrorCode::kNotFound, "no such store").in(place);
+  if (!std::filesystem::exists(place, error))
+    return failure(ErrorCode::kNotFound, "no such store").in(place).next("its path stands in the server file as store");
   auto file =
       std::make_unique<SqliteDatabase>(uri_to_look_at(place), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
   if (integer_of(*file, "PRAGMA application_id") != kApplicationId) return refused("no store").in(place);

@@ -114,7 +114,11 @@ TEST_F(StoreCopyTest, ADamagedStoreIsFoundAndNoCopyOfItIsLeft) {
 }
 
 TEST_F(StoreCopyTest, NamesWhatIsNotThere) {
-  EXPECT_EQ(look_through_store(folder_.file("no.db")).error().code, ErrorCode::kNotFound);
+  const auto none = look_through_store(folder_.file("no.db"));
+  EXPECT_EQ(none.error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(none.error().next, "its path stands in the server file as store");
+  const auto away = look_through_store("postgresql://somebody@127.0.0.1:1/plant");
+  EXPECT_EQ(away.error().next, "see that PostgreSQL runs there");
   EXPECT_EQ(copy_store(folder_.file("no.db"), url_).error().code, ErrorCode::kNotFound);
   EXPECT_EQ(look_through_store(postgres_.new_database()).error().code, ErrorCode::kRefused);
 }

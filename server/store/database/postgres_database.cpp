@@ -197,7 +197,8 @@ Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect_to_one(const
   if (!connection) return failure(ErrorCode::kInternal, "no memory for a connection");
   if (const std::string why = why_not_connected(connection.get()); !why.empty()) {
     const bool for_good = is_refused_for_good(connection.get(), why);
-    return failure(for_good ? ErrorCode::kRefused : ErrorCode::kUnreachable, "{}", why);
+    return failure(for_good ? ErrorCode::kRefused : ErrorCode::kUnreachable, "{}", why)
+        .next(for_good ? "mend the URL, or what the database allows" : "see that PostgreSQL runs there");
   }
   if (const int version = ::PQserverVersion(connection.get()); version < kOldestServer)
     return refused("PostgreSQL {} is too old, limit {}", version / 10000, kOldestServer / 10000)
