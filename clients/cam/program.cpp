@@ -121,8 +121,24 @@ FramesRows rows_of(const Program& program) {
   return rows;
 }
 
-bool same_tool_of_program(const ProgramTool& a, const ProgramTool& b) {
-  return a.name == b.name && a.file == b.file && a.line == b.line && a.carries == b.carries;
+std::size_t add_once(Program& program, ProgramTool tool) {
+  for (std::size_t k = 0; k < program.tools.size(); ++k) {
+    const ProgramTool& known = program.tools[k];
+    if (known.name == tool.name && known.file == tool.file && known.line == tool.line &&
+        known.carries == tool.carries && known.why_not == tool.why_not)
+      return k;
+  }
+  program.tools.push_back(std::move(tool));
+  return program.tools.size() - 1;
+}
+
+std::size_t add_once(Program& program, ProgramFrame frame) {
+  for (std::size_t k = 0; k < program.frames.size(); ++k) {
+    const ProgramFrame& known = program.frames[k];
+    if (known.name == frame.name && known.why_not == frame.why_not && known.X_BO.isApprox(frame.X_BO, 1e-12)) return k;
+  }
+  program.frames.push_back(std::move(frame));
+  return program.frames.size() - 1;
 }
 
 std::string called(const ProgramTool& tool) {

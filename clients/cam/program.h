@@ -271,8 +271,10 @@ struct FramesRows {
 };
 [[nodiscard]] FramesRows rows_of(const Program& program);
 
-/// A tool of the list that is the same to every motion: name, place, and what it carries.
-[[nodiscard]] bool same_tool_of_program(const ProgramTool& a, const ProgramTool& b);
+/// The number of a tool in the program's list, where it is put if no tool of that name, place and load is there.
+std::size_t add_once(Program& program, ProgramTool tool);
+/// The same of a frame: of that name and pose.
+std::size_t add_once(Program& program, ProgramFrame frame);
 /// `spindle`, `spindle carrying lPart`
 [[nodiscard]] std::string called(const ProgramTool& tool);
 /// Leaves the targets that stand in files of these names: those that a motion goes to are told, with the reason.

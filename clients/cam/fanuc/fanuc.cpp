@@ -503,22 +503,8 @@ class File {
     return against_row(row, X, X_BW * *told.X, told.where);
   }
 
-  std::size_t add_frame(ProgramFrame frame) {
-    for (std::size_t k = 0; k < program_.frames.size(); ++k) {
-      const ProgramFrame& known = program_.frames[k];
-      if (known.name == frame.name && known.why_not == frame.why_not && known.X_BO.isApprox(frame.X_BO, 1e-12))
-        return k;
-    }
-    program_.frames.push_back(std::move(frame));
-    return program_.frames.size() - 1;
-  }
-  std::size_t add_tool(ProgramTool tool) {
-    for (std::size_t k = 0; k < program_.tools.size(); ++k) {
-      if (same_tool_of_program(program_.tools[k], tool) && program_.tools[k].why_not == tool.why_not) return k;
-    }
-    program_.tools.push_back(std::move(tool));
-    return program_.tools.size() - 1;
-  }
+  std::size_t add_frame(ProgramFrame frame) { return add_once(program_, std::move(frame)); }
+  std::size_t add_tool(ProgramTool tool) { return add_once(program_, std::move(tool)); }
 
   std::size_t frame_of(const std::string& number_text) {
     ProgramFrame frame;

@@ -337,22 +337,8 @@ class Reader {
 
   // Tools and bases.
 
-  std::size_t add_tool(ProgramTool tool) {
-    for (std::size_t k = 0; k < program_.tools.size(); ++k) {
-      if (same_tool_of_program(program_.tools[k], tool) && program_.tools[k].why_not == tool.why_not) return k;
-    }
-    program_.tools.push_back(std::move(tool));
-    return program_.tools.size() - 1;
-  }
-  std::size_t add_frame(ProgramFrame frame) {
-    for (std::size_t k = 0; k < program_.frames.size(); ++k) {
-      const ProgramFrame& known = program_.frames[k];
-      if (known.name == frame.name && known.why_not == frame.why_not && known.X_BO.isApprox(frame.X_BO, 1e-12))
-        return k;
-    }
-    program_.frames.push_back(std::move(frame));
-    return program_.frames.size() - 1;
-  }
+  std::size_t add_tool(ProgramTool tool) { return add_once(program_, std::move(tool)); }
+  std::size_t add_frame(ProgramFrame frame) { return add_once(program_, std::move(frame)); }
 
   std::size_t tool_numbered(int number, std::size_t f) {
     if (number == 0) return add_tool({"TOOL_DATA[0]", "", 0, Pose::Identity(), std::nullopt, 0, ""});
