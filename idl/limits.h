@@ -8,7 +8,7 @@
 /// topics.h.
 namespace trammel::wire {
 
-/// UDP port of the first server on a host; replicas take every second one after it.
+/// UDP port of the first server on a host; others take every second one after it.
 inline constexpr std::uint16_t kFirstPort = 17500;
 
 /// Equal for servers and clients: unequal leases delay discovery.

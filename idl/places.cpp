@@ -160,7 +160,7 @@ Result<ParticipantPtr> announce_place(const Place& place, const std::vector<Host
   if (!beacon) return beacon;
   // A discovery server passes on nobody who has no endpoint. Nothing is ever written.
   const auto topic =
-      make_topic(**beacon, kTopic, new SafeType<ReplicaStatusTopic::Type>(ReplicaStatusTopic::kMaxSample));
+      make_topic(**beacon, kTopic, new SafeType<ServiceStatusTopic::Type>(ServiceStatusTopic::kMaxSample));
   if (!topic) return tl::make_unexpected(topic.error());
   dds::Publisher* const publisher = (*beacon)->create_publisher(publisher_qos({}));
   if (publisher == nullptr || publisher->create_datawriter(*topic, state_writer_qos()) == nullptr)

@@ -162,7 +162,7 @@ Status check_permissions(const Folder& folder, const std::string& subject, const
   return {};
 }
 
-/// The role in `<grant name="line-3: replica">`, as deploy/security/keys writes it.
+/// The role in `<grant name="line-3: server">`, as deploy/security/keys writes it.
 std::string role_in(const std::string& permissions) {
   constexpr std::string_view kBegin = "<grant name=\"";
   const std::size_t begin = permissions.find(kBegin);
@@ -171,7 +171,7 @@ std::string role_in(const std::string& permissions) {
   const std::size_t colon = permissions.find(": ", begin);
   if (end == std::string::npos || colon >= end) return {};
   const std::string role = permissions.substr(colon + 2, end - colon - 2);
-  constexpr std::array<std::string_view, 5> kKnown{"replica", "observer", "cam", "metrologist", "engineer"};
+  constexpr std::array<std::string_view, 5> kKnown{"server", "observer", "cam", "metrologist", "engineer"};
   return std::find(kKnown.begin(), kKnown.end(), role) == kKnown.end() ? std::string() : role;
 }
 
@@ -268,11 +268,11 @@ Result<Security> read_security(const std::string& path) {
 }
 
 Status check_serves(const Security& security) {
-  if (security.role.empty() || security.role == "replica") return {};
+  if (security.role.empty() || security.role == "server") return {};
   return Folder(security.folder)
       .wrong("permissions.p7s",
-             fmt::format("{} has the role {}, and a service needs the role replica", security.subject, security.role))
-      .next("keys issue PLANT replica NAME makes such a folder; see deploy/security/README.md");
+             fmt::format("{} has the role {}, and a service needs the role server", security.subject, security.role))
+      .next("keys issue PLANT server NAME makes such a folder; see deploy/security/README.md");
 }
 
 }  // namespace trammel::wire

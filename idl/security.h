@@ -21,7 +21,7 @@ struct Security {
 /// whose permissions are for another subject, have expired or are not valid yet.
 [[nodiscard]] Result<Security> read_security(const std::string& folder);
 
-/// Whether a service may have these permissions: those of another role than `replica` let it answer nothing, and the
+/// Whether a service may have these permissions: those of another role than `server` let it answer nothing, and the
 /// library would say so of one of its topics only. Permissions that are not from deploy/security/keys may be anything.
 [[nodiscard]] Status check_serves(const Security& security);
 

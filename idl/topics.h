@@ -9,7 +9,6 @@
 #include "predict_errorPubSubTypes.h"
 #include "read_modelsPubSubTypes.h"
 #include "release_batchesPubSubTypes.h"
-#include "replicaPubSubTypes.h"
 #include "statePubSubTypes.h"
 #include "trainingPubSubTypes.h"
 
@@ -91,26 +90,6 @@ struct ServiceStatusTopic {
   using Type = ServiceStatusPubSubType;
   static constexpr const char* kName = "ServiceStatus";
   static constexpr std::size_t kMaxSample = kMaxStateSample;
-};
-struct ReplicaStatusTopic {
-  using Type = ReplicaStatusPubSubType;
-  static constexpr const char* kName = "ReplicaStatus";
-  static constexpr std::size_t kMaxSample = kMaxStateSample;
-};
-struct BatchCopyTopic {
-  using Type = BatchCopyPubSubType;
-  static constexpr const char* kName = "BatchCopy";
-  static constexpr std::size_t kMaxSample = kMaxTextSample;
-};
-struct BatchCopiedTopic {
-  using Type = BatchCopiedPubSubType;
-  static constexpr const char* kName = "BatchCopied";
-  static constexpr std::size_t kMaxSample = kMaxStateSample;
-};
-struct ModelSnapshotTopic {
-  using Type = ModelSnapshotPubSubType;
-  static constexpr const char* kName = "ModelSnapshot";
-  static constexpr std::size_t kMaxSample = kMaxTextSample;
 };
 
 }  // namespace trammel::wire

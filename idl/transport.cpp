@@ -18,7 +18,7 @@ namespace rtps = eprosima::fastrtps::rtps;
 // parts: it holds certificate and permissions. Others may send larger ones.
 constexpr std::uint32_t kDatagramOfALine = 1400;
 constexpr std::uint32_t kSecuredDatagramOfALine = 16384;
-constexpr int kReplicaDepth = 16;
+constexpr int kServersDepth = 16;
 // Until a reader has confirmed everything: a lost reply is to be missed at once. A state has readers in every client.
 constexpr std::chrono::milliseconds kHeartbeat{10}, kStateHeartbeat{200};
 
@@ -145,7 +145,7 @@ dds::DataWriterQos state_writer_qos() {
 
 dds::DataReaderQos state_reader_qos() {
   dds::DataReaderQos qos;
-  set_state_history(qos, kReplicaDepth);
+  set_state_history(qos, kServersDepth);
   set_reader_times(qos);
   return qos;
 }

@@ -57,7 +57,7 @@ struct ParticipantOptions {
 [[nodiscard]] dds::DataWriterQos call_writer_qos(int depth);
 [[nodiscard]] dds::DataReaderQos call_reader_qos(int depth);
 /// State topics: reliable, transient local, the last sample of each of any number of keys; a reader keeps a few,
-/// because replicas write the same keys.
+/// because several servers write the same keys.
 [[nodiscard]] dds::DataWriterQos state_writer_qos();
 [[nodiscard]] dds::DataReaderQos state_reader_qos();
 /// TrainingProgress is volatile instead: earlier progress is asked for with READ_JOB.

@@ -43,7 +43,6 @@ void shape(CdrWalk& walk, Of<RequestHeader>, Text trace = Text::kToken) {
 void shape(CdrWalk& walk, Of<Change>) {
   token(walk, "change id");
   walk.longs(1);
-  walk.wides(1);
 }
 
 void shape(CdrWalk& walk, Of<Context>) {
@@ -82,7 +81,6 @@ void shape(CdrWalk& walk, Of<ReplyHeader>) {
   token(walk, "server");
   walk.longs(1);
   token(walk, "trace_id");
-  walk.wides(1);
 }
 
 void shape(CdrWalk& walk, Of<Note>) {
@@ -297,52 +295,6 @@ void shape(CdrWalk& walk, Of<ServiceStatus>) {
   walk.wides(8);
   walk.longs(1);
   sentence(walk, "trouble");
-  walk.wides(1);
-}
-
-void shape(CdrWalk& walk, Of<ReplicaStatus>) {
-  token(walk, "server");
-  walk.enumerator("role", REPLICA_FOLLOWER);
-  token(walk, "follows");
-  walk.wides(1);
-  walk.list("cells", MAX_CELLS, 4 * kNumber, "cell", [&] {
-    walk.text("cell", MAX_NAME, Text::kPlain);
-    walk.longs(1);
-    id(walk, "hash");
-    walk.longs(1);
-  });
-  sentence(walk, "trouble");
-}
-
-void shape(CdrWalk& walk, Of<BatchCopy>) {
-  token(walk, "server");
-  token(walk, "to");
-  walk.wides(1);
-  walk.text("cell", MAX_NAME, Text::kPlain);
-  id(walk, "batch_id");
-  id(walk, "hash");
-  file_text(walk, "csv");
-  sentence(walk, "quarantine");
-  walk.flag("discarded");
-  walk.flag("learned");
-  sentence(walk, "outcome");
-  walk.wides(1);
-}
-
-void shape(CdrWalk& walk, Of<BatchCopied>) {
-  token(walk, "server");
-  token(walk, "to");
-  walk.wides(1);
-  walk.enumerator("result", RESULT_MALFORMED);
-  sentence(walk, "why");
-}
-
-void shape(CdrWalk& walk, Of<ModelSnapshot>) {
-  walk.text("cell", MAX_NAME, Text::kPlain);
-  id(walk, "server");
-  walk.longs(1);
-  id(walk, "hash");
-  file_text(walk, "text");
 }
 
 }  // namespace
@@ -391,9 +343,5 @@ template std::optional<Fault> find_fault<ReleaseBatchesReply>(Sample);
 template std::optional<Fault> find_fault<ModelStatus>(Sample);
 template std::optional<Fault> find_fault<TrainingProgress>(Sample);
 template std::optional<Fault> find_fault<ServiceStatus>(Sample);
-template std::optional<Fault> find_fault<ReplicaStatus>(Sample);
-template std::optional<Fault> find_fault<BatchCopy>(Sample);
-template std::optional<Fault> find_fault<BatchCopied>(Sample);
-template std::optional<Fault> find_fault<ModelSnapshot>(Sample);
 
 }  // namespace trammel::wire

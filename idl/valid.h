@@ -11,7 +11,6 @@
 #include "predict_error.h"
 #include "read_models.h"
 #include "release_batches.h"
-#include "replica.h"
 #include "state.h"
 #include "training.h"
 

@@ -129,10 +129,6 @@ void log_progress(const JobProgress& progress) {
   }
 }
 
-void log_replicas(const ReplicaNews& news) {
-  tell(news.is_good ? LogLevel::kInfo : LogLevel::kWarn, news.event, news.what);
-}
-
 /// Whoever asks for nonsense all day does not fill the log: of one kind a few lines a minute are written.
 void log_call(const CallReport& call) {
   const std::string trace = call.trace.empty() ? "" : fmt::format(" (trace {})", call.trace);
@@ -159,7 +155,7 @@ void ignore_what_calls_report() {
 /// Cells that are served already stay as they are.
 void add_cells(const ServedCells& cells, DdsService& service, Trainer& trainer) {
   for (const std::string& notice : trainer.add_cells(cells)) tell(LogLevel::kWarn, "notice", notice);
-  if (const Status told = service.cells_added(); !told) tell(LogLevel::kWarn, "notice", sentence(told.error()));
+  service.cells_added();
 }
 
 /// Reads the server file again and takes on what can change while it serves. Of a file that is refused nothing is
@@ -177,7 +173,6 @@ void reload(const Arguments& arguments, ServerConfig& config, DdsService& servic
     config = plan.config;
     change_log(config.log);
     service.set_limits(config.dds);
-    service.set_replica(config.dds.replica);
     trainer.set_limits(config.trainer.queue_capacity, config.trainer.keep);
     if (config.cells.size() > trainer.cells().size()) add_cells(config.cells, service, trainer);
     tell(LogLevel::kInfo, "reloaded",
@@ -254,7 +249,6 @@ Status serve(ServerConfig config, const Arguments& arguments) {
   if (const Status listens = http.start(); !listens) return listens;
   service.set_call_listener(log_call);
   service.set_packet_listener([](const char* event, const std::string& what) { tell(LogLevel::kWarn, event, what); });
-  service.set_replica_listener(log_replicas);
   trainer.set_listeners(
       [&service, &http](const JobProgress& progress) {
         log_progress(progress);

@@ -26,7 +26,7 @@ struct Route {
   std::string cell;                ///< preferred: a server that serves this cell
   std::string server;              ///< only to this one; empty: any
   bool changes_something = false;  ///< a repeat goes to the same server if it can: that one recognises it
-  bool of_writer = false;  ///< what followers may lack or number otherwise: they are asked only where nobody else is
+  bool may_be_long = false;  ///< an answer from the record: silence for a moment does not mean that nobody is there
 };
 
 /// One operation of a session: a request writer, a reply reader in the session's partition, and the calls that wait.
@@ -107,7 +107,7 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
 
   Result<Reply> attempt(Request& request, const Route& route, Clock::time_point deadline) {
     const auto half = Clock::now() + (deadline - Clock::now()) / 2;
-    const bool hedges = !route.changes_something && !route.of_writer && route.server.empty();
+    const bool hedges = !route.changes_something && !route.may_be_long && route.server.empty();
     std::set<std::string> asked;  // participants
     std::string first, last;      // servers
     for (const Sending sending : {Sending::kFirst, Sending::kHedge, Sending::kAgain}) {
@@ -150,11 +150,10 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     // The repeat may also go to a server whose reply writer is not matched yet: it may have had too many clients.
     const bool and_back = sending == Sending::kFirst;
     const std::string only = route.server.empty() && route.changes_something ? last : route.server;
-    return watch_.wait_for_server(route.cell, route.changes_something ? std::string() : last,
-                                  route.changes_something || route.of_writer, until, [&](const KnownServer& known) {
-                                    return (only.empty() || only == known.id()) &&
-                                           reachable(known.participant, and_back);
-                                  });
+    return watch_.wait_for_server(
+        route.cell, route.changes_something ? std::string() : last, until, [&](const KnownServer& known) {
+          return (only.empty() || only == known.id()) && reachable(known.participant, and_back);
+        });
   }
 
   /// Waits until it is there, or all that were asked have left.

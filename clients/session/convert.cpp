@@ -274,13 +274,6 @@ BatchOfService from_wire(const wire::BatchInfo& batch) {
           batch.hash(), batch.learned()};
 }
 
-ReplicaPart from_wire(const wire::ReplicaStatus& status) {
-  ReplicaPart part{status.role() == wire::REPLICA_WRITER, status.follows().to_string(), status.epoch(), {}};
-  for (const wire::ReplicaCell& cell : status.cells())
-    part.cells.push_back({cell.cell().to_string(), cell.version(), cell.hash(), cell.newest()});
-  return part;
-}
-
 ServerStatus from_wire(const wire::ServiceStatus& status) {
   ServerStatus result;
   result.server_id = status.server().to_string();

@@ -17,7 +17,6 @@ namespace trammel::client {
 [[nodiscard]] PredictedError from_wire(const wire::PredictedError& prediction);
 [[nodiscard]] CorrectedTarget from_wire(const wire::CorrectedTarget& correction);
 [[nodiscard]] JobStatus status_of(const wire::Job& job);
-[[nodiscard]] ReplicaPart from_wire(const wire::ReplicaStatus& status);
 [[nodiscard]] ServerStatus from_wire(const wire::ServiceStatus& status);
 [[nodiscard]] DatedJob from_wire(const wire::Job& job, const std::string& server);
 [[nodiscard]] BatchOfService from_wire(const wire::BatchInfo& batch);

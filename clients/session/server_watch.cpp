@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <tuple>
 
-#include "idl/quiet_library.h"
-
 namespace trammel::client {
 namespace {
 
@@ -30,16 +28,6 @@ Result<std::unique_ptr<ServerWatch>> ServerWatch::open(wire::dds::DomainParticip
       });
   if (!old_status) return tl::make_unexpected(old_status.error());
   watch->old_status_reader_ = std::move(*old_status);
-  {
-    // Permissions that were given before there were replicas do not allow it.
-    const wire::QuietLibrary quiet;
-    auto replica = wire::StateReader<wire::ReplicaStatusTopic>::open(
-        participant, subscriber, wire::state_reader_qos(),
-        [self](const wire::ReplicaStatus* sample, const std::string& writer, double) {
-          self->on_replica(sample, writer);
-        });
-    if (replica) watch->replica_reader_ = std::move(*replica);
-  }
   auto model = wire::StateReader<wire::ModelStatusTopic>::open(
       participant, subscriber, wire::state_reader_qos(),
       [self](const wire::ModelStatus* sample, const std::string& writer, double written) {
@@ -93,12 +81,12 @@ bool ServerWatch::is_settled(const KnownServer& chosen, const std::string& cell)
 }
 
 std::optional<KnownServer> ServerWatch::wait_for_server(const std::string& cell, const std::string& avoid,
-                                                        bool of_writer, Clock::time_point deadline,
+                                                        Clock::time_point deadline,
                                                         const std::function<bool(const KnownServer&)>& reachable) {
   MutexLock lock(mutex_);
   const KnownServer* chosen = nullptr;
   const auto look = [&]() TRAMMEL_REQUIRES(mutex_) {
-    chosen = choose(cell, avoid, of_writer, reachable);
+    chosen = choose(cell, avoid, reachable);
     return chosen != nullptr;
   };
   wait_for_first(lock, std::min(deadline, Clock::now() + wire::kStatusLost),
@@ -111,7 +99,7 @@ std::optional<KnownServer> ServerWatch::wait_for_server(const std::string& cell,
 std::optional<KnownServer> ServerWatch::another_server(const std::string& cell, const std::string& avoid,
                                                        const std::function<bool(const KnownServer&)>& reachable) {
   const MutexLock lock(mutex_);
-  const KnownServer* chosen = choose(cell, avoid, false, [&](const KnownServer& server) {
+  const KnownServer* chosen = choose(cell, avoid, [&](const KnownServer& server) {
     return server.id() != avoid && serves(server, cell) && reachable(server);
   });
   if (chosen == nullptr) return std::nullopt;
@@ -123,16 +111,13 @@ void ServerWatch::was_slow(const std::string& server) {
   slow_[server] = Clock::now();
 }
 
-const KnownServer* ServerWatch::choose(const std::string& cell, const std::string& avoid, bool of_writer,
+const KnownServer* ServerWatch::choose(const std::string& cell, const std::string& avoid,
                                        const std::function<bool(const KnownServer&)>& reachable) const {
   const auto merit = [&](const KnownServer& server) TRAMMEL_REQUIRES(mutex_) {
-    const auto replica = replicas_.find(server.id());
-    const bool writes = replica != replicas_.end() && replica->second.second.role() == wire::REPLICA_WRITER;
-    const std::uint64_t epoch = of_writer && writes ? replica->second.second.epoch() : 0;
     const auto slow = slow_.find(server.id());
     const bool is_quick = slow == slow_.end() || slow->second < server.heard;
     return std::tuple(serves(server, cell), Clock::now() - server.heard < wire::kStatusLost, server.id() != avoid,
-                      epoch, is_quick);
+                      is_quick);
   };
   const KnownServer* best = nullptr;
   for (const auto& [id, server] : servers_) {
@@ -156,21 +141,10 @@ std::vector<KnownServer> ServerWatch::wait_for_servers(std::size_t count, Clock:
   MutexLock lock(mutex_);
   wait_for_first(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) { return !servers_.empty(); });
   changed_.wait_until(lock, std::min(deadline, Clock::now() + wire::kStatusPeriod),
-                      [&]() TRAMMEL_REQUIRES(mutex_) { return servers_.size() >= count && knows_all_parts(); });
+                      [&]() TRAMMEL_REQUIRES(mutex_) { return servers_.size() >= count; });
   std::vector<KnownServer> servers;
-  for (const auto& [id, server] : servers_) {
-    servers.push_back(server);
-    if (const auto replica = replicas_.find(id); replica != replicas_.end())
-      servers.back().replica = replica->second.second;
-  }
+  for (const auto& [id, server] : servers_) servers.push_back(server);
   return servers;
-}
-
-bool ServerWatch::knows_all_parts() const {
-  return replica_reader_ == nullptr ||
-         std::all_of(servers_.begin(), servers_.end(), [this](const auto& entry) TRAMMEL_REQUIRES(mutex_) {
-           return entry.second.status.epoch() == 0 || replicas_.contains(entry.first);
-         });
 }
 
 bool ServerWatch::knows_all_models() const {
@@ -195,22 +169,18 @@ std::vector<wire::ModelInfo> ServerWatch::models_in_force() {
   MutexLock lock(mutex_);
   changed_.wait_until(lock, Clock::now() + wire::kStatusPeriod,
                       [this]() TRAMMEL_REQUIRES(mutex_) { return knows_all_models(); });
-  // What the newest decision put in force; of servers that count none, the highest version.
-  std::map<std::string, std::uint64_t> epoch_of;  // by participant
-  for (const auto& [id, replica] : replicas_) epoch_of[replica.first] = replica.second.epoch();
-  std::map<std::string, std::pair<std::uint64_t, wire::ModelInfo>> newest;
+  // Where servers differ for a moment, what was told last: all of one record come to that.
+  std::map<std::string, std::pair<double, wire::ModelInfo>> last;  // by cell, with how long ago, s
   for (const auto& [key, known] : models_) {
     wire::ModelInfo model = known.model;
     const double since_s = age_s(key.first, known);
     model.data_age_s(model.data_age_s() + since_s);
     model.training_age_s(model.training_age_s() + since_s);
-    const std::pair found{epoch_of[key.first], model};
-    const auto [entry, added] = newest.emplace(key.second, found);
-    const auto& [epoch, present] = entry->second;
-    if (!added && std::pair(found.first, model.version()) > std::pair(epoch, present.version())) entry->second = found;
+    const auto [entry, added] = last.emplace(key.second, std::pair(since_s, model));
+    if (!added && since_s < entry->second.first) entry->second = {since_s, model};
   }
   std::vector<wire::ModelInfo> models;
-  for (const auto& [cell, found] : newest) models.push_back(found.second);
+  for (const auto& [cell, told] : last) models.push_back(told.second);
   return models;
 }
 
@@ -250,18 +220,6 @@ void ServerWatch::on_status(const wire::ServiceStatus* status, const std::string
       servers_[status->server().to_string()] = {participant, *status, Clock::now(), written_s};
     } else {
       std::erase_if(servers_, [&](const auto& entry) { return entry.second.participant == participant; });
-    }
-  }
-  changed_.notify_all();
-}
-
-void ServerWatch::on_replica(const wire::ReplicaStatus* status, const std::string& participant) {
-  {
-    const MutexLock lock(mutex_);
-    if (status != nullptr) {
-      replicas_[status->server().to_string()] = {participant, *status};
-    } else {
-      std::erase_if(replicas_, [&](const auto& entry) { return entry.second.first == participant; });
     }
   }
   changed_.notify_all();

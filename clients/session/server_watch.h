@@ -25,7 +25,6 @@ struct KnownServer {
   wire::ServiceStatus status;
   Clock::time_point heard;
   double written_s = 0;  ///< when the status was written, by the server's clock for what it writes
-  std::optional<wire::ReplicaStatus> replica = {};  ///< empty: it is no replica, or this is not allowed to be read
 
   [[nodiscard]] std::string id() const { return status.server().to_string(); }
 };
@@ -50,12 +49,12 @@ class ServerWatch {
                                                                  wire::dds::Subscriber& subscriber, std::size_t named);
 
   /// Chooses among the servers that `reachable` accepts: preferably one that serves `cell`, then one that published its
-  /// status lately, then one that is not `avoid`, then (`of_writer`) the one that writes, then one that was not slower
-  /// than another one lately (was_slow()). Waits until `deadline` for the first server, less long where all that
-  /// are there speak another contract. One that does not serve the cell is taken only when no other can be expected:
-  /// all named servers are known, or kStatusLost is over.
+  /// status lately, then one that is not `avoid`, then one that was not slower than another one lately (was_slow()).
+  /// Waits until `deadline` for the first server, less long where all that are there speak another contract. One that
+  /// does not serve the cell is taken only when no other can be expected: all named servers are known, or kStatusLost
+  /// is over.
   [[nodiscard]] std::optional<KnownServer> wait_for_server(const std::string& cell, const std::string& avoid,
-                                                           bool of_writer, Clock::time_point deadline,
+                                                           Clock::time_point deadline,
                                                            const std::function<bool(const KnownServer&)>& reachable);
   /// The same without waiting, and never `avoid` nor one that does not serve the cell.
   [[nodiscard]] std::optional<KnownServer> another_server(const std::string& cell, const std::string& avoid,
@@ -92,14 +91,11 @@ class ServerWatch {
   void on_status(const wire::ServiceStatus* status, const std::string& participant, double written_s);
   void on_model(const wire::ModelStatus* status, const std::string& participant, double written_s);
   void on_progress(const wire::TrainingProgress* progress);
-  void on_replica(const wire::ReplicaStatus* status, const std::string& participant);
-  [[nodiscard]] const KnownServer* choose(const std::string& cell, const std::string& avoid, bool of_writer,
+  [[nodiscard]] const KnownServer* choose(const std::string& cell, const std::string& avoid,
                                           const std::function<bool(const KnownServer&)>& reachable) const
       TRAMMEL_REQUIRES(mutex_);
   /// Whether `chosen` serves the cell, or no named server does.
   [[nodiscard]] bool is_settled(const KnownServer& chosen, const std::string& cell) const TRAMMEL_REQUIRES(mutex_);
-  /// Whether the part of every server that has one is known.
-  [[nodiscard]] bool knows_all_parts() const TRAMMEL_REQUIRES(mutex_);
   /// How long ago the model was described so, by its server's clock alone: others may differ from it, or be set.
   [[nodiscard]] double age_s(const std::string& participant, const KnownModel& known) const TRAMMEL_REQUIRES(mutex_);
   /// Whether the models of every server are as many as it reports.
@@ -110,9 +106,7 @@ class ServerWatch {
   Condition changed_;
   std::map<std::string, OtherServer> others_ TRAMMEL_GUARDED_BY(mutex_);  // by participant
   std::optional<Clock::time_point> others_since_ TRAMMEL_GUARDED_BY(mutex_);
-  std::map<std::string, KnownServer> servers_ TRAMMEL_GUARDED_BY(mutex_);  // by id
-  std::map<std::string, std::pair<std::string, wire::ReplicaStatus>> replicas_
-      TRAMMEL_GUARDED_BY(mutex_);  // by id: the participant, and what it says
+  std::map<std::string, KnownServer> servers_ TRAMMEL_GUARDED_BY(mutex_);     // by id
   std::map<std::string, Clock::time_point> slow_ TRAMMEL_GUARDED_BY(mutex_);  // by id
   std::map<std::pair<std::string, std::string>, KnownModel> models_
       TRAMMEL_GUARDED_BY(mutex_);  // by participant and cell
@@ -121,7 +115,6 @@ class ServerWatch {
   std::uint64_t progress_count_ TRAMMEL_GUARDED_BY(mutex_) = 0;
   std::unique_ptr<wire::StateReader<wire::ServiceStatusTopic>> status_reader_;
   std::unique_ptr<wire::StateReader<wire::OldServiceStatusTopic>> old_status_reader_;
-  std::unique_ptr<wire::StateReader<wire::ReplicaStatusTopic>> replica_reader_;
   std::unique_ptr<wire::StateReader<wire::ModelStatusTopic>> model_reader_;
   std::unique_ptr<wire::StateReader<wire::TrainingProgressTopic>> progress_reader_;
 };

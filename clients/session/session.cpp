@@ -29,7 +29,6 @@ constexpr std::chrono::milliseconds kJobPoll{2000};
 constexpr std::size_t kHomesRemembered = 1000;  // of a session's jobs
 constexpr std::chrono::milliseconds kLook{50};  // between two looks at what servers say
 constexpr int kShareOfLooking = 2;              // of the timeout: its half at most, for discovery servers
-constexpr int kReferrals = 4;                   // from server to server, of one request
 constexpr std::uint32_t kLeastPatience = 10;    // ms, before a busy server is asked again
 
 /// A unique name, also across hosts: 128 random bits.
@@ -74,14 +73,6 @@ Status check_text(const std::string& what, const std::string& text) {
   return failure(ErrorCode::kTooLarge, "{} bytes, limit {}", text.size(), wire::kMaxText)
       .in(what)
       .beyond(text.size(), wire::kMaxText);
-}
-
-/// The server that makes the change that was asked of one that does not; empty: that is not what is wrong.
-std::optional<std::string> writer_named(const wire::ReplyHeader& header) {
-  if (header.result() != wire::RESULT_UNSUPPORTED || header.problems().size() != 1) return std::nullopt;
-  const wire::Problem& problem = header.problems().front();
-  if (problem.field() != "server" || problem.text().empty()) return std::nullopt;
-  return problem.text();
 }
 
 bool is_over(const JobStatus& job) { return job.stage == "done" || job.stage == "failed" || job.stage == "cancelled"; }
@@ -204,32 +195,20 @@ struct Session::Participant {
     return made.caller.get();
   }
 
-  /// Sends one request. A server that follows another one names it, and that one is asked; where it cannot be found by
-  /// what was named, this is said at once. A server that is busy has
-  /// not done it and is asked again when it says, until the deadline; a change keeps its id.
+  /// Sends one request. A server that is busy has not done it and is asked again when it says, until the deadline; a
+  /// change keeps its id.
   template <typename Operation>
   [[nodiscard]] Result<typename Operation::Reply::type> call(const typename Operation::Request::type& request,
-                                                             Route route) {
+                                                             const Route& route) {
     const auto caller = caller_of<Operation>();
     if (!caller) return tl::make_unexpected(caller.error());
     const auto until = deadline();
-    std::optional<typename Operation::Reply::type> referral;
-    int referrals = 0;
     while (true) {
       auto reply = (*caller)->call(request, route, until);
-      if (const auto writer = reply ? writer_named(reply->header()) : std::nullopt;
-          writer && ++referrals < kReferrals) {
-        if (!may_be_found(*writer, until)) return not_found(*writer, *reply);
-        route.server = *writer;
-        referral = std::move(*reply);
-        continue;
-      }
-      if (!reply && referral) return as_result<typename Operation::Reply::type>(std::move(*referral));
       const bool is_busy = reply && reply->header().result() == wire::RESULT_BUSY;
       const auto again = Clock::now() + std::chrono::milliseconds(
                                             is_busy ? std::max(reply->header().retry_after_ms(), kLeastPatience) : 0);
       if (!is_busy || again >= until) return as_result(std::move(reply));
-      if (std::exchange(referrals, 0) > 0) route.server.clear();  // who writes may be another one by then
       watch->wait_until(again);
     }
   }
@@ -256,7 +235,7 @@ struct Session::Participant {
     return accepted(*reply);
   }
 
-  /// From `server`; empty: from the one that writes, if it is there.
+  /// From `server`; empty: from any.
   [[nodiscard]] Result<wire::ReadModelsReply> read(const std::string& cell, const std::string& server,
                                                    wire::ReadKind what, wire::ReadModelsRequest request = {}) {
     request.about().cell(cell);
@@ -276,21 +255,6 @@ struct Session::Participant {
       replies.push_back(std::move(*reply));
     }
     return replies;
-  }
-
-  /// False where all servers that were named are there, and this one is none of them.
-  [[nodiscard]] bool may_be_found(const std::string& server, Clock::time_point until) {
-    const auto known = watch->wait_for_servers(options.servers.size(), until);
-    return known.size() < options.servers.size() ||
-           std::any_of(known.begin(), known.end(), [&](const KnownServer& one) { return one.id() == server; });
-  }
-  template <typename Reply>
-  [[nodiscard]] Failure not_found(const std::string& writer, const Reply& referral) const {
-    return failure(ErrorCode::kUnreachable, "{}; {} is not among the servers that were named ({})",
-                   error_of(referral.header()).message, writer, where_it_looked())
-        .of("server")
-        .with_text(writer)
-        .next(fmt::format("name the host and port of {}, too", writer));
   }
 
   [[nodiscard]] Failure not_allowed(const char* operation) const {
@@ -385,8 +349,7 @@ struct Session::Participant {
       typename Operation::Request::type request;
       request.about(to_wire(context));
       for (std::size_t i = first; i < first + count; ++i) put(request).push_back(items[i]);
-      const bool of_a_version = context.model.starts_with('@');  // which each server counts for itself
-      const auto reply = call<Operation>(request, {context.cell, {}, false, of_a_version});
+      const auto reply = call<Operation>(request, {context.cell});
       if (!reply) return tl::make_unexpected(reply.error());
       if (get(*reply).size() != count) {
         return failure(ErrorCode::kInternal, "server {} answered {} items for {}", reply->header().server().to_string(),
@@ -705,10 +668,7 @@ Result<std::vector<ServerStatus>> Session::servers() {
   const auto known = participant_->watch->wait_for_servers(options.servers.size(), participant_->deadline());
   if (known.empty()) return tl::make_unexpected(participant_->no_server());
   std::vector<ServerStatus> servers;
-  for (const KnownServer& server : known) {
-    servers.push_back(from_wire(server.status));
-    if (server.replica) servers.back().replica = from_wire(*server.replica);
-  }
+  for (const KnownServer& server : known) servers.push_back(from_wire(server.status));
   return servers;
 }
 

@@ -17,7 +17,7 @@ namespace trammel::client {
 
 struct SessionOptions {
   std::uint32_t domain = 0;
-  std::vector<std::uint16_t> server_ports = {17500};  ///< on `address`, one per replica
+  std::vector<std::uint16_t> server_ports = {17500};  ///< on `address`, one per server
   std::chrono::milliseconds timeout{5000};  ///< of one request, discovery included; a long call is many requests
   std::string address = "127.0.0.1";        ///< IPv4 that the servers listen on, one of this host's; else kUsage
   /// Servers anywhere. Where there are some, `server_ports` and `address` are not looked at, and the interface is the

@@ -146,22 +146,6 @@ struct BatchOfService {
   std::string server = {};  ///< that says so
 };
 
-/// What a replica serves a cell with.
-struct ServedVersion {
-  std::string cell;
-  int version = 0;  ///< as that server counts; 0: none
-  std::string hash;
-  int newest = 0;  ///< the highest number of a version that it knows of
-};
-
-/// Which part a server has among those that serve the same cells.
-struct ReplicaPart {
-  bool writes = false;
-  std::string follows;      ///< of one that does not: who writes, as far as it knows
-  std::uint64_t epoch = 0;  ///< of the last decision that it has; the higher one is the newer
-  std::vector<ServedVersion> cells;
-};
-
 struct ServerStatus {
   std::string server_id, version, state;
   std::vector<std::string> cells;
@@ -172,7 +156,6 @@ struct ServerStatus {
   std::string trouble;                            ///< what it cannot do now, and why; empty: nothing
   double uptime_s = 0;
   int queued_jobs = 0;
-  std::optional<ReplicaPart> replica = {};  ///< empty: it knows of no others
 };
 
 }  // namespace trammel::client

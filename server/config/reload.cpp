@@ -53,14 +53,6 @@ ReloadPlan plan_reload(const ServerConfig& present, const ServerConfig& file) {
   take("trainer: keep_batches", now.trainer.keep.batches, file.trainer.keep.batches, &plan.now);
   take("trainer: keep_answers", now.trainer.keep.answers, file.trainer.keep.answers, &plan.now);
 
-  // Whether there are others at all is known when topics are made.
-  const auto alone = ReplicaOptions::Role::kAlone;
-  if ((present.dds.replica.role == alone) == (file.dds.replica.role == alone)) {
-    take("replica", now.dds.replica, file.dds.replica, &plan.now);
-  } else {
-    plan.later.emplace_back("replica");
-  }
-
   leave("server", present.dds.server_id, file.dds.server_id, &plan.later);
   leave("store", present.store, file.store, &plan.later);
   leave("cache", present.cache, file.cache, &plan.later);
@@ -72,8 +64,6 @@ ReloadPlan plan_reload(const ServerConfig& present, const ServerConfig& file) {
   leave("http: port", present.http.port, file.http.port, &plan.later);
   leave("record", present.dds.record, file.dds.record, &plan.later);
   leave("models_in_memory_mb", present.models_in_memory, file.models_in_memory, &plan.later);
-  leave("dds: peer_ports", present.dds.peer_ports, file.dds.peer_ports, &plan.later);
-  leave("dds: peers", present.dds.peers, file.dds.peers, &plan.later);
   leave("dds: discovery_servers", present.dds.discovery_servers, file.dds.discovery_servers, &plan.later);
   leave("dds: ros2", present.dds.ros2, file.dds.ros2, &plan.later);
   leave("dds: security", present.dds.security, file.dds.security, &plan.later);

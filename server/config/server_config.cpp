@@ -3,7 +3,6 @@
 #include <arpa/inet.h>
 
 #include <algorithm>
-#include <charconv>
 #include <filesystem>
 #include <limits>
 
@@ -81,34 +80,6 @@ std::string address(const YamlMap& map, const std::string& otherwise, const Cons
   return text;
 }
 
-std::vector<std::uint16_t> peer_ports(const YamlMap& map, std::uint16_t own) {
-  std::vector<std::uint16_t> ports;
-  if (!map.has("peer_ports")) return ports;
-  for (const std::string& text : map.texts("peer_ports")) {
-    int port = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
-    if (error != std::errc{} || end != text.data() + text.size() || port < 1024 || port > 65535) {
-      map.refuse("peer_ports", refused("'{}', expected a whole number, limit 1024 to 65535", text).with_text(text));
-    }
-    if (port == own) map.refuse("peer_ports", refused("{} is this server's own port", port).with_value(port));
-    if (std::find(ports.begin(), ports.end(), port) != ports.end())
-      map.refuse("peer_ports", refused("{} is given twice", port).with_value(port));
-    ports.push_back(static_cast<std::uint16_t>(port));
-  }
-  return ports;
-}
-
-std::vector<HostPort> peers(const YamlMap& map) {
-  std::vector<HostPort> places;
-  if (!map.has("peers")) return places;
-  for (const std::string& text : map.texts("peers")) {
-    const auto place = parse_host_port(text, DdsOptions{}.port);
-    if (!place) map.refuse("peers", refused("{}", place.error().message).with_text(text));
-    places.push_back(*place);
-  }
-  return places;
-}
-
 /// The position of each is its number, so that none is said twice.
 std::vector<HostPort> discovery_servers(const YamlMap& map, const DdsOptions& dds) {
   const std::string key = "discovery_servers";
@@ -132,17 +103,15 @@ std::vector<HostPort> discovery_servers(const YamlMap& map, const DdsOptions& dd
 }
 
 void read_dds(const YamlMap& map, const std::filesystem::path& folder, DdsOptions& dds) {
-  map.only({"domain", "address", "allow_network", "without_security", "security", "port", "peer_ports", "peers",
-            "discovery_servers", "compute_workers", "max_clients", "client_requests", "client_mb", "queued_requests",
-            "queued_mb", "cell_share", "ros2"});
+  map.only({"domain", "address", "allow_network", "without_security", "security", "port", "discovery_servers",
+            "compute_workers", "max_clients", "client_requests", "client_mb", "queued_requests", "queued_mb",
+            "cell_share", "ros2"});
   map.attempt([&] {
     dds.domain = static_cast<std::uint32_t>(integer_within(map, "domain", static_cast<int>(dds.domain), 0, kMaxDomain));
   });
   const Consent given = consent(map);
   map.attempt([&] { dds.address = address(map, dds.address, given); });
   map.attempt([&] { dds.port = static_cast<std::uint16_t>(integer_within(map, "port", dds.port, 1024, 65535)); });
-  map.attempt([&] { dds.peer_ports = peer_ports(map, dds.port); });
-  map.attempt([&] { dds.peers = peers(map); });
   map.attempt([&] { dds.discovery_servers = discovery_servers(map, dds); });
   map.attempt([&] {
     if (!map.is_null("security")) dds.security = (folder / map.text("security")).string();
@@ -166,27 +135,6 @@ std::string word_of(const YamlMap& map, const std::string& key, const std::strin
     map.refuse(key,
                refused("'{}', expected {}{}", word, fmt::join(known, ", "), did_you_mean(word, known)).with_text(word));
   return word;
-}
-
-double seconds_of(const YamlMap& map, const std::string& key, double otherwise, double lower, double upper) {
-  return map.is_null(key) ? otherwise : number_within(map, key, otherwise, lower, upper);
-}
-
-void read_replica(const YamlMap& map, const std::string& self, ReplicaOptions& replica) {
-  map.only({"role", "of", "promote_after_s", "batches_to_followers", "copy_timeout_s"});
-  map.attempt([&] {
-    const std::string role = word_of(map, "role", "", {"writer", "follower"});
-    replica.role = role == "writer" ? ReplicaOptions::Role::kWriter : ReplicaOptions::Role::kFollower;
-  });
-  map.attempt([&] {
-    const bool follows = replica.role == ReplicaOptions::Role::kFollower;
-    if (follows || map.has("of")) replica.of = server_id(map, "of");
-    if (!follows && map.has("of")) map.refuse("of", refused("a writer follows nobody").with_text(replica.of));
-    if (replica.of == self) map.refuse("of", refused("{} is this server itself", self).with_text(self));
-  });
-  map.attempt([&] { replica.promote_after_s = seconds_of(map, "promote_after_s", 0, 3, 86400); });
-  map.attempt([&] { replica.batches_to_followers = map.boolean("batches_to_followers", false); });
-  map.attempt([&] { replica.copy_timeout_s = seconds_of(map, "copy_timeout_s", replica.copy_timeout_s, 0.1, 60); });
 }
 
 void read_record(const YamlMap& map, const std::filesystem::path& folder, RecordOptions& record) {
@@ -296,9 +244,8 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
     if (map.has("dds")) read_dds(map.map("dds"), folder, config.dds);
   });
   map.attempt([&] {
-    if (!map.is_null("replica") && is_postgres_url(config.store))
-      map.refuse("replica", "servers of one PostgreSQL are peers: leave it out");
-    if (!map.is_null("replica")) read_replica(map.map("replica"), config.dds.server_id, config.dds.replica);
+    if (map.has("replica"))
+      map.refuse("replica", "no server follows another one; give all of them one `store: postgresql://...` instead");
   });
   map.attempt([&] {
     if (!map.is_null("record")) read_record(map.map("record"), folder, config.dds.record);

@@ -390,17 +390,6 @@ void put_error(const wire::Fault& fault, wire::ReplyHeader& header) {
   header.problems().front().code(fault.code);
 }
 
-void put_error(const ChangesElsewhere& elsewhere, wire::ReplyHeader& header) {
-  const bool is_known = !elsewhere.writer.empty();
-  Error error = failure(is_known ? ErrorCode::kUsage : ErrorCode::kBusy, "{}", elsewhere.why).of("server").value();
-  error.text = elsewhere.writer;
-  if (is_known) error.next = "ask " + elsewhere.writer;
-  put_error(error, header);
-  if (!is_known) return;
-  header.result(wire::RESULT_UNSUPPORTED);
-  header.problems().front().code(wire::RESULT_UNSUPPORTED);
-}
-
 std::string requester(const wire::RequestHeader& header) {
   constexpr std::size_t kOfParticipant = 12;  // octets of a GUID
   std::string text = "client ";

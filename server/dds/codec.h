@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "idl/valid.h"
-#include "server/dds/replicas/replica_news.h"
 #include "server/registry/model_registry.h"
 #include "server/trainer/trainer.h"
 
@@ -50,8 +49,6 @@ namespace trammel {
 /// The error in the header of a reply: code, sentence and data.
 void put_error(const Error& error, wire::ReplyHeader& header);
 void put_error(const wire::Fault& fault, wire::ReplyHeader& header);
-/// Of a change that another server makes: who, in `text` of the problem. Where nobody is there the client asks again.
-void put_error(const ChangesElsewhere& elsewhere, wire::ReplyHeader& header);
 /// Of what this server knows, and does not do.
 template <typename Reply>
 [[nodiscard]] Reply unsupported(const std::string& field) {

@@ -9,30 +9,14 @@
 
 namespace trammel {
 
-/// Which part a server has among those that serve the same cells.
-struct ReplicaOptions {
-  enum class Role {
-    kAlone,    ///< it knows nothing of others
-    kWriter,   ///< what changes its cells is asked of it
-    kFollower  ///< it has what `of` puts in force
-  } role = Role::kAlone;
-  std::string of = {};                ///< of a follower: the server that writes
-  double promote_after_s = 0;         ///< a follower writes when nobody has for so long; 0: a person decides
-  bool batches_to_followers = false;  ///< a batch is on all followers that are there before it is acknowledged
-  double copy_timeout_s = 2;          ///< that this may take
-  bool operator==(const ReplicaOptions&) const = default;
-};
-
 /// Domain, address, ports and name of the service on DDS. The default talks to this host only.
 struct DdsOptions {
   std::uint32_t domain = 0;
   std::string address = "127.0.0.1";        ///< IPv4 of the only interface that is used
   std::uint16_t port = 17500;               ///< UDP; clients look for the server here; one server per port
-  std::vector<std::uint16_t> peer_ports;    ///< UDP ports of the replicas on `address`
-  std::vector<HostPort> peers;              ///< where else it looks for replicas: on other hosts, too
   std::vector<HostPort> discovery_servers;  ///< they tell clients of `address` and `port`; position = number
   std::string security;                     ///< folder of idl/security.h; empty: everybody is believed
-  std::string server_id = "trammel";        ///< unique among replicas; 1 to 64 letters, digits, `.`, `_`, `-`
+  std::string server_id = "trammel";        ///< unique among servers; 1 to 64 letters, digits, `.`, `_`, `-`
   std::string program_version = "0.1.0";
   int compute_workers = 2;     ///< threads for PredictError, and as many for CorrectTarget
   int max_clients = 256;       ///< reply channels at a time; when more clients come, those take turns that do nothing
@@ -40,10 +24,9 @@ struct DdsOptions {
   int client_mb = 64;          ///< memory that they may take, all together
   int queued_requests = 4096;  ///< requests of all clients that may wait, likewise
   int queued_mb = 256;         ///< memory that they may take, all together
-  ReplicaOptions replica = {};
-  RecordOptions record = {};  ///< of predictions and corrections
-  double cell_share = 0.5;    ///< of these two, for the requests of one cell
-  bool ros2 = false;          ///< whether ROS 2 nodes are answered, too (idl/ros2.h); not together with `security`
+  RecordOptions record = {};   ///< of predictions and corrections
+  double cell_share = 0.5;     ///< of these two, for the requests of one cell
+  bool ros2 = false;           ///< whether ROS 2 nodes are answered, too (idl/ros2.h); not together with `security`
 };
 
 }  // namespace trammel

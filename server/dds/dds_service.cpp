@@ -23,7 +23,6 @@
 #include "server/dds/old_contract.h"
 #include "server/dds/packet_report.h"
 #include "server/dds/port_lock.h"
-#include "server/dds/replicas/replica_link.h"
 #include "server/dds/reply_channels.h"
 #include "server/dds/request_endpoint.h"
 #include "server/dds/ros2/ros2_endpoint.h"
@@ -127,8 +126,7 @@ class DdsService::Running {
   [[nodiscard]] static Result<std::unique_ptr<Running>> start(const DdsOptions& options, Trainer& trainer, Store& store,
                                                               const ModelRegistry& registry,
                                                               const PacketListener& packet_listener,
-                                                              const CallListener& call_listener,
-                                                              const ReplicaListener& replica_listener) {
+                                                              const CallListener& call_listener) {
     if (const Status fit = check_names(options, trainer); !fit) return tl::make_unexpected(fit.error());
     auto library = std::make_optional<ThreadName>("dds");
     auto port = PortLock::take(options.address, options.port);
@@ -138,10 +136,16 @@ class DdsService::Running {
     const auto dropped = std::make_shared<wire::DropCounts>();
     const auto security = security_of(options.security);
     if (!security) return tl::make_unexpected(security.error());
-    auto participant =
-        wire::make_participant({"trammel server " + options.server_id, options.domain, options.address, options.port,
-                                options.peer_ports, heard, dropped, options.peers, *security},
-                               events.get());
+    auto participant = wire::make_participant({"trammel server " + options.server_id,
+                                               options.domain,
+                                               options.address,
+                                               options.port,
+                                               {},
+                                               heard,
+                                               dropped,
+                                               {},
+                                               *security},
+                                              events.get());
     if (!participant) return tl::make_unexpected(participant.error());
     wire::dds::Subscriber* subscriber = (*participant)->create_subscriber(wire::subscriber_qos({}));
     if (subscriber == nullptr) return failure(ErrorCode::kInternal, "cannot create the subscriber of requests");
@@ -154,15 +158,10 @@ class DdsService::Running {
     std::unique_ptr<Running> running(new Running(options, trainer, store, registry, std::move(*port), std::move(events),
                                                  std::move(*participant), *subscriber, *topics, std::move(*echo)));
     running->core_.listener = call_listener;
-    auto replicas = ReplicaLink::open(*running->participant_, *subscriber, running->topics_.snapshot_topic(),
-                                      options.server_id, options.replica, trainer, store, replica_listener);
-    if (!replicas) return tl::make_unexpected(replicas.error());
-    running->replicas_ = std::move(*replicas);
     auto recorder = RequestRecorder::open(options.record);
     if (!recorder) return tl::make_unexpected(recorder.error());
     running->recorder_ = std::move(*recorder);
     running->core_.recorder = running->recorder_.get();
-    running->handlers_.set_replicas(running->replicas_.get());
     running->handlers_.set_names(&running->events_->names());
     if (const Status opened = running->open_endpoints(); !opened) return tl::make_unexpected(opened.error());
     for (Lane* lane : running->lanes()) lane->start();
@@ -185,11 +184,9 @@ class DdsService::Running {
     publish_status(wire::SERVICE_STOPPING);
     for (const auto& endpoint : endpoints_) endpoint->close();
     old_contract_.reset();
-    if (replicas_) replicas_->stop_copying();
     for (Lane* lane : lanes()) lane->stop();
     replies_thread_ = {};
     endpoints_.clear();
-    replicas_.reset();
   }
 
   Running(const Running&) = delete;
@@ -210,17 +207,9 @@ class DdsService::Running {
       if (const auto model = registry_.in_force(cell)) topics_.publish(*model, options_.server_id);
     }
     events_->status_changed();
-    if (replicas_) replicas_->changed();
   }
 
-  [[nodiscard]] Status cells_added() {
-    events_->status_changed();
-    return replicas_ ? replicas_->cells_added() : Status();
-  }
-
-  void set_replica(const ReplicaOptions& options) {
-    if (replicas_) replicas_->set_options(options);
-  }
+  void cells_added() { events_->status_changed(); }
 
   void set_limits(const DdsOptions& options) {
     room_.set_limits(room_limits(options));
@@ -241,7 +230,6 @@ class DdsService::Running {
     now.unreadable = *core_.unreadable;
     now.lost = core_.counts.lost;
     now.work = handlers_.work().all();
-    if (replicas_) now.replica = replicas_->figures();
     if (recorder_) now.not_recorded = recorder_->dropped();
     now.strangers = events_->refusals();
     for (std::size_t i = 0; i < wire::kDroppedReasons; ++i) {
@@ -387,10 +375,7 @@ class DdsService::Running {
     status.misdirected(core_.counts.misdirected);
     status.unreadable(*core_.unreadable);
     status.lost(core_.counts.lost);
-    std::vector<std::string> troubles = trainer_.troubles();
-    if (replicas_) std::ranges::move(replicas_->troubles(), std::back_inserter(troubles));
-    status.trouble(cut(fmt::format("{}", fmt::join(troubles, "; ")), wire::MAX_SENTENCE));
-    if (replicas_) status.epoch(replicas_->epoch());
+    status.trouble(cut(fmt::format("{}", fmt::join(trainer_.troubles(), "; ")), wire::MAX_SENTENCE));
     status.uptime_s(std::chrono::duration<double>(Clock::now() - started_).count());
     status.queued_jobs(trainer_.queued_jobs());
     topics_.publish(std::move(status));
@@ -412,7 +397,6 @@ class DdsService::Running {
   Lane predictions_, corrections_, reads_, changes_;
   ServiceCore core_;
   std::unique_ptr<RequestRecorder> recorder_;  // null: nothing is recorded
-  std::unique_ptr<ReplicaLink> replicas_;      // null: it knows of no others
   Mutex publishing_mutex_;
   std::map<std::string, Mutex> publishing_
       TRAMMEL_GUARDED_BY(publishing_mutex_);  // by cell, nothing leaves it; a cell publishes one model at a time
@@ -441,8 +425,6 @@ DdsService::~DdsService() { stop(); }
 
 void DdsService::set_call_listener(CallListener listener) { call_listener_ = std::move(listener); }
 
-void DdsService::set_replica_listener(ReplicaListener listener) { replica_listener_ = std::move(listener); }
-
 void DdsService::set_packet_listener(PacketListener listener) { packet_listener_ = std::move(listener); }
 
 Status DdsService::start() {
@@ -451,8 +433,7 @@ Status DdsService::start() {
     if (running_) return {};
   }
   // Without the lock: its workers may publish.
-  auto started =
-      Running::start(options_, trainer_, store_, registry_, packet_listener_, call_listener_, replica_listener_);
+  auto started = Running::start(options_, trainer_, store_, registry_, packet_listener_, call_listener_);
   if (!started) return tl::make_unexpected(started.error());
   {
     const MutexLock lock(mutex_);
@@ -481,14 +462,8 @@ void DdsService::set_limits(const DdsOptions& options) {
   while_running([&](Running& running) { running.set_limits(options); });
 }
 
-void DdsService::set_replica(const ReplicaOptions& options) {
-  while_running([&](Running& running) { running.set_replica(options); });
-}
-
-Status DdsService::cells_added() {
-  Status told;
-  while_running([&](Running& running) { told = running.cells_added(); });
-  return told;
+void DdsService::cells_added() {
+  while_running([](Running& running) { running.cells_added(); });
 }
 
 ServiceFigures DdsService::figures() {

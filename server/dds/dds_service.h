@@ -8,7 +8,6 @@
 #include "server/base/result.h"
 #include "server/dds/call_report.h"
 #include "server/dds/dds_options.h"
-#include "server/dds/replicas/replica_news.h"
 #include "server/metrics/service_figures.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
@@ -42,9 +41,6 @@ class DdsService {
   /// Called when a request was to change something, or was refused, in the thread that answers it. Set it before
   /// start().
   void set_call_listener(CallListener listener);
-  /// Called when a person should know something of the other servers of the same cells, in a thread of the service. Set
-  /// it before start().
-  void set_replica_listener(ReplicaListener listener);
   /// Starts to answer and publishes the models in force. Call it after Trainer::take_up(). Refuses a port that is
   /// taken, an address that this host does not have, and a server or cell name that the wire does not allow.
   [[nodiscard]] Status start();
@@ -58,11 +54,8 @@ class DdsService {
 
   /// From now on these limits of what may wait; of the rest of the options nothing changes.
   void set_limits(const DdsOptions& options);
-  /// The trainer serves more cells: clients and other servers are told. Refused: what others have put in force for them
-  /// comes with the next change only. Call it from one thread.
-  [[nodiscard]] Status cells_added();
-  /// The part that the server file gives it now (ReplicaRole::told()).
-  void set_replica(const ReplicaOptions& options);
+  /// The trainer serves more cells: clients are told.
+  void cells_added();
   /// What was done since start(); nothing where it does not run.
   [[nodiscard]] ServiceFigures figures();
   /// Whether its threads do their work. Waits for none of them.
@@ -77,7 +70,6 @@ class DdsService {
   const DdsOptions options_;
   PacketListener packet_listener_ = [](const char*, const std::string&) {};
   CallListener call_listener_;
-  ReplicaListener replica_listener_;
   Trainer& trainer_;
   Store& store_;
   const ModelRegistry& registry_;

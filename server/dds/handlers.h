@@ -9,7 +9,6 @@
 #include "idl/valid.h"
 #include "server/base/mutex.h"
 #include "server/dds/portioned_answer.h"
-#include "server/dds/replicas/replica_news.h"
 #include "server/metrics/work_counts.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
@@ -18,7 +17,6 @@
 namespace trammel {
 
 class ClientNames;
-class ReplicaLink;
 
 /// What a request is about, looked up once. The whole answer comes from this one model.
 struct Subject {
@@ -55,14 +53,10 @@ class Handlers {
   Handlers(Trainer& trainer, Store& store, const ModelRegistry& registry)
       : trainer_(trainer), store_(store), registry_(registry), subjects_(trainer, registry) {}
 
-  /// Who the other servers of the same cells are; null: nobody. It outlives the requests. Set before there are any.
-  void set_replicas(ReplicaLink* replicas) { replicas_ = replicas; }
   /// The names of clients; null: nobody has one. They outlive the requests. Set before there are any.
   void set_names(const ClientNames* names) { names_ = names; }
   /// The subject of the certificate of a DDS participant; empty: it has shown none.
   [[nodiscard]] std::string name_of(const std::string& participant) const;
-  /// Whether another server makes changes; empty: this one.
-  [[nodiscard]] std::optional<ChangesElsewhere> changes_elsewhere() const;
 
   /// What the cells were asked for since the start.
   [[nodiscard]] const WorkCounts& work() const { return work_; }
@@ -117,7 +111,6 @@ class Handlers {
   Store& store_;
   const ModelRegistry& registry_;
   SubjectFinder subjects_;
-  ReplicaLink* replicas_ = nullptr;
   const ClientNames* names_ = nullptr;
   WorkCounts work_;  // requests refer to it, and end before it
 };

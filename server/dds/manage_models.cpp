@@ -1,13 +1,11 @@
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
-#include "server/dds/replicas/replica_link.h"
 
 namespace trammel {
 
 Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest& request) {
   if (request.force() && request.action() != wire::MANAGE_ACTIVATE)
     return unsupported<wire::ManageModelsReply>("force");
-  if (request.change().expected_epoch() != 0) return unsupported<wire::ManageModelsReply>("expected_epoch");
   if (request.action() == wire::MANAGE_BACKUP) return unsupported<wire::ManageModelsReply>("action");
   const std::string& cell = request.about().cell();
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
@@ -54,13 +52,10 @@ Status Handlers::cancel(const std::string& cell, std::int64_t job, const std::st
 }
 
 Result<wire::ReleaseBatchesReply> Handlers::answer(const wire::ReleaseBatchesRequest& request) {
-  if (request.change().expected_epoch() != 0) return unsupported<wire::ReleaseBatchesReply>("expected_epoch");
   const std::string& cell = request.about().cell();
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
   const auto job = released(cell, request);
   if (!job) return tl::make_unexpected(job.error());
-  if (replicas_ != nullptr && request.action() != wire::RELEASE_AND_TRAIN)
-    replicas_->bring_batch(cell, request.batch_ids().front());
   wire::ReleaseBatchesReply reply;
   reply.job(*job);
   return reply;

@@ -132,9 +132,6 @@ class Call final : public Job {
     guarded([&] {
       if constexpr (kComputes) {
         portions_->compute(first, count);
-      } else if (const auto elsewhere =
-                     happens_once(*request_) ? context_.handlers.changes_elsewhere() : std::nullopt) {
-        refuse(*elsewhere);
       } else {
         accept(context_.handlers.answer(*request_));
       }
@@ -209,7 +206,7 @@ class Call final : public Job {
     }
   }
 
-  /// `why`: an Error, a wire::Fault or ChangesElsewhere.
+  /// `why`: an Error or a wire::Fault.
   template <typename Why>
   void refuse(const Why& why) {
     const MutexLock lock(mutex_);

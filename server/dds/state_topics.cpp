@@ -1,7 +1,6 @@
 #include "server/dds/state_topics.h"
 
 #include "idl/contract_1.h"
-#include "server/compensate/model_file.h"
 #include "server/dds/codec.h"
 
 namespace trammel {
@@ -50,10 +49,6 @@ Result<StateTopics> StateTopics::open(wire::dds::DomainParticipant& participant)
     opened = open_writer(wire::make_state_topic<wire::ModelStatusTopic>(participant), *publisher,
                          wire::state_writer_qos(), topics.model_status_);
   }
-  if (opened) {
-    opened = open_writer(wire::make_state_topic<wire::ModelSnapshotTopic>(participant), *publisher,
-                         wire::state_writer_qos(), topics.model_snapshot_);
-  }
   if (!opened) return tl::make_unexpected(opened.error());
   return topics;
 }
@@ -72,14 +67,6 @@ void StateTopics::publish(const ServedModel& model, const std::string& server_id
   status.server(server_id);
   status.model(to_wire(model, true, unix_now_s()));
   model_status_->write(&status);
-
-  wire::ModelSnapshot snapshot;
-  snapshot.cell(model.cell);
-  snapshot.server(server_id);
-  snapshot.version(model.version);
-  snapshot.hash(model.model.provenance().hash);
-  snapshot.text(serialize(model.model));
-  model_snapshot_->write(&snapshot);
 }
 
 }  // namespace trammel

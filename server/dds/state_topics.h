@@ -14,12 +14,10 @@ class StateTopics {
 
   [[nodiscard]] const wire::dds::DataWriter& status_writer() const { return *service_status_; }
 
-  [[nodiscard]] wire::dds::Topic& snapshot_topic() const { return *model_snapshot_->get_topic(); }
-
   /// Writes it for clients of every contract.
   void publish(wire::ServiceStatus status);
   void publish(wire::TrainingProgress progress);
-  /// Writes ModelStatus and ModelSnapshot. A model that is too large for a sample has no ModelSnapshot.
+  /// Writes ModelStatus.
   void publish(const ServedModel& model, const std::string& server_id);
 
  private:
@@ -28,7 +26,6 @@ class StateTopics {
   wire::dds::DataWriter* old_service_status_ = nullptr;
   wire::dds::DataWriter* training_progress_ = nullptr;
   wire::dds::DataWriter* model_status_ = nullptr;
-  wire::dds::DataWriter* model_snapshot_ = nullptr;
 };
 
 }  // namespace trammel

@@ -3,7 +3,6 @@
 #include "server/dds/client_names.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
-#include "server/dds/replicas/replica_link.h"
 
 namespace trammel {
 namespace {
@@ -39,10 +38,6 @@ std::string Handlers::who(const wire::RequestHeader& header) const {
   return name.empty() ? requester(header) : name + " " + requester(header);
 }
 
-std::optional<ChangesElsewhere> Handlers::changes_elsewhere() const {
-  return replicas_ == nullptr ? std::nullopt : replicas_->changes_elsewhere();
-}
-
 Result<wire::SubmitMeasurementsReply> Handlers::answer(const wire::SubmitMeasurementsRequest& request) {
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
   if (request.batch_id().empty()) return refused("a batch without an id").of("batch_id");
@@ -52,7 +47,6 @@ Result<wire::SubmitMeasurementsReply> Handlers::answer(const wire::SubmitMeasure
                                                               : request.change_id().to_string(),
                       who(request.header()));
   if (!job) return tl::make_unexpected(job.error());
-  if (replicas_ != nullptr) replicas_->bring_batch(request.about().cell(), request.batch_id());
   wire::SubmitMeasurementsReply reply;
   reply.job(*job);
   return reply;
@@ -62,7 +56,6 @@ Result<wire::TrainReply> Handlers::answer(const wire::TrainRequest& request) {
   if (!request.batch_rule().empty()) return unsupported<wire::TrainReply>("batch_rule");
   if (!request.prior().empty()) return unsupported<wire::TrainReply>("prior");
   if (request.diagnosis() != 0) return unsupported<wire::TrainReply>("diagnosis");
-  if (request.change().expected_epoch() != 0) return unsupported<wire::TrainReply>("expected_epoch");
   if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
   const auto job = trained(request);
   if (!job) return tl::make_unexpected(job.error());

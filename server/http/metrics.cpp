@@ -1,7 +1,5 @@
 #include "server/http/metrics.h"
 
-#include <algorithm>
-
 #include "server/base/plain_text.h"
 #include "server/base/unix_time.h"
 #include "server/http/metric_families.h"
@@ -116,20 +114,6 @@ void add_models_in_memory(MetricFamilies& out, const ModelRegistry& registry) {
   out.gauge("trammel_cells_with_a_model", "Cells with a model in force.", number(registry.cells_served()));
 }
 
-void add_replica(MetricFamilies& out, const ReplicaFigures& replica) {
-  out.gauge("trammel_replica_writes", "1: it changes what is in force; 0: it follows another one.",
-            replica.writes ? 1 : 0);
-  out.gauge("trammel_replica_epoch", "Of the last decision of what is in force that it knows.", number(replica.epoch));
-  out.gauge("trammel_replica_others", "Other servers of the same cells that are there.", number(replica.others));
-  for (const char* kind : {"role", "follow", "divergence", "batches", "name"}) {
-    const bool is_there = std::find(replica.troubles.begin(), replica.troubles.end(), kind) != replica.troubles.end();
-    out.gauge("trammel_replica_trouble",
-              "1: role: two or none write; follow: a model is not taken over; divergence: two models at one epoch; "
-              "batches: a follower may lack some; name: another server has its name.",
-              is_there ? 1 : 0, {{"kind", kind}});
-  }
-}
-
 }  // namespace
 
 void Metrics::job_changed(const JobProgress& job) {
@@ -169,7 +153,6 @@ std::string Metrics::text(ServerPhase phase, std::uint64_t shed) {
   const ServiceFigures service = server_.figures();
   add_requests(out, service);
   add_work(out, service.work);
-  if (service.replica) add_replica(out, *service.replica);
   if (service.not_recorded)
     out.counter("trammel_requests_not_recorded_total", "Requests that are in no record: the disk was too slow or full.",
                 number(*service.not_recorded));

@@ -78,16 +78,6 @@ CellReadiness readiness_of(const std::string& cell, const Known& known, const Wa
   return untrained(cell, server, asked);
 }
 
-/// What is wrong among the servers of the same cells.
-std::string words_of_trouble(const std::string& kind) {
-  if (kind == "role") return "two of the replicas write, or none does";
-  if (kind == "follow") return "a model that the writing replica has in force is not served here";
-  if (kind == "divergence") return "replicas that are in step serve different models";
-  if (kind == "batches") return "a replica may lack batches that this one has";
-  if (kind == "name") return "another replica has this one's name";
-  return kind;
-}
-
 /// What does not stop it from answering.
 std::vector<std::string> notes_of(const Watched& server) {
   std::vector<std::string> notes;
@@ -98,9 +88,6 @@ std::vector<std::string> notes_of(const Watched& server) {
                                 sentence(*state.why_not_written)));
   if (!state.clock.empty()) notes.push_back(state.clock);
   notes.insert(notes.end(), state.damages.begin(), state.damages.end());
-  if (const auto replica = server.figures().replica) {
-    for (const std::string& kind : replica->troubles) notes.push_back(words_of_trouble(kind));
-  }
   return notes;
 }
 

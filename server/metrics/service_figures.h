@@ -24,14 +24,6 @@ struct QueueFigures {
   std::size_t requests = 0;  ///< that wait or are worked on
 };
 
-/// Of a server among others that serve the same cells.
-struct ReplicaFigures {
-  bool writes = false;                ///< it changes what is in force
-  std::uint64_t epoch = 0;            ///< of the last decision that it knows
-  std::size_t others = 0;             ///< that are there
-  std::vector<std::string> troubles;  ///< their kinds, as `trammel_replica_trouble` has them
-};
-
 /// Counts are since the service started.
 struct ServiceFigures {
   std::vector<OperationFigures> operations;
@@ -45,7 +37,6 @@ struct ServiceFigures {
   std::uint64_t lost = 0;                                ///< requests that DDS lost before the service saw them
   std::map<std::string, std::uint64_t> dropped_packets;  ///< by reason
   std::map<std::string, WorkFigures> work;               ///< by cell
-  std::optional<ReplicaFigures> replica = {};            ///< empty: it is no replica
   std::optional<std::uint64_t> not_recorded = {};        ///< requests that were to be; empty: none are
 };
 

@@ -17,8 +17,7 @@ namespace {
 /// Of the cell $1. Without a reference to the row, so that it is read once.
 constexpr const char* kLearned =
     "SELECT job_batches.batch FROM job_batches JOIN jobs ON jobs.id = job_batches.job "
-    "WHERE jobs.cell = $1 AND jobs.state = 'done' AND jobs.model_version > 0 "
-    "UNION SELECT batch FROM learned_elsewhere WHERE cell = $1";
+    "WHERE jobs.cell = $1 AND jobs.state = 'done' AND jobs.model_version > 0";
 
 const std::string& record_columns() {
   static const std::string columns = fmt::format(
@@ -137,35 +136,6 @@ Status Store::discard(const std::string& cell, const std::string& id, const Chan
     });
   });
   return changed.map([](const ChangeOutcome&) {});
-}
-
-Status Store::take_over_batch(const StoredBatch& there, const ChangeId& by) {
-  return connection_->in_transaction([&](Database& database) -> Status {
-    lock_cell(database, there.cell);
-    const auto here = read_record(database, there.cell, there.id);
-    if (!here) return tl::make_unexpected(here.error());
-    // What keeps it out is that it has a reason, whatever that says.
-    const std::string quarantine = there.discarded && there.quarantine.empty() ? "discarded" : there.quarantine;
-    if (here->hash != there.hash) return other_content(there, here->job);
-    if (here->discarded && !there.discarded) return discarded_failure(there.cell, there.id);
-    const auto record = [&](const char* what, const std::string& before, const std::string& after) {
-      record_audit(database, {there.cell, what, "batch " + there.id, before, after}, by);
-    };
-    if (there.learned && !here->learned) {
-      change(database, "INSERT INTO learned_elsewhere (cell, batch) VALUES ($1, $2)", there.cell, there.id);
-      record("follow", "", "a model was made of it");
-    }
-    if (there.discarded && !here->discarded)
-      change(database, "INSERT INTO discarded (cell, batch) VALUES ($1, $2)", there.cell, there.id);
-    if (quarantine == here->quarantine) return {};
-    change(database, "UPDATE batches SET quarantine = $1 WHERE cell = $2 AND id = $3", quarantine, there.cell,
-           there.id);
-    record(there.discarded      ? "discard"
-           : quarantine.empty() ? "release"
-                                : "quarantine",
-           spoken(here->quarantine), there.discarded ? quarantine : spoken(quarantine));
-    return {};
-  });
 }
 
 Result<StoredBatch> Store::batch(const std::string& cell, const std::string& id) const {

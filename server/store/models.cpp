@@ -68,9 +68,6 @@ void insert_activation(Database& database, const std::string& cell, int version,
          cell, version, back, unix_now(), *number);
 }
 
-/// Whoever decides what is in force counts it; who follows takes the number of the one that decided.
-void count_decision(Database& database) { change(database, "UPDATE replica SET epoch = epoch + 1 WHERE writes = 1"); }
-
 /// Releases from quarantine the batches that the job of this version may release.
 void release_batches_of(Database& database, const std::string& cell, int version, const ChangeId& by) {
   auto rows = prepare(database,
@@ -129,7 +126,6 @@ void activate_on_top(Database& database, const std::string& cell, int version, c
   const auto present = present_activation(database, cell);
   if (present && present->version == version) return;
   insert_activation(database, cell, version, present ? std::optional(present->number) : std::nullopt);
-  count_decision(database);
   record_audit(database, {cell, what, "in force", spoken(present), fmt::format("version {}", version), why}, by);
 }
 
@@ -213,73 +209,6 @@ Status Store::activate(const std::string& cell, int version, const ChangeId& cha
   return activated.map([](const ChangeOutcome&) {});
 }
 
-namespace {
-
-/// The version under which a model of this hash is stored with its text; empty: none is.
-std::optional<int> version_of_hash(Database& database, const std::string& cell, const std::string& hash) {
-  auto rows =
-      prepare(database, "SELECT version FROM models WHERE cell = $1 AND hash = $2 ORDER BY version DESC", cell, hash);
-  while (rows.next()) {
-    const int version = rows.integer(0);
-    if (!is_pruned(database, "version", cell, std::to_string(version))) return version;
-  }
-  return std::nullopt;
-}
-
-/// Writes a model's text anew where what is stored is something else.
-void mend_model(Database& database, const std::string& cell, int version, const std::string& content,
-                const ChangeId& by) {
-  auto differs = prepare(database, "SELECT 1 FROM models WHERE cell = $1 AND version = $2 AND content <> $3", cell,
-                         version, content);
-  if (!differs.next()) return;
-  change(database, "UPDATE models SET content = $1 WHERE cell = $2 AND version = $3", content, cell, version);
-  record_audit(database, {cell, "mend", fmt::format("version {}", version), "damaged", "as it was"}, by);
-}
-
-/// The other server's number, if it is free here: what is stored already is not written over.
-Result<int> free_version(Database& database, const std::string& cell, int wanted) {
-  const bool taken = exists(database, "SELECT 1 FROM models WHERE cell = $1 AND version = $2", cell, wanted);
-  return taken || wanted < 1 || wanted > kHighestTold ? next_version(database, cell) : Result<int>(wanted);
-}
-
-}  // namespace
-
-Result<int> Store::adopt(const std::string& cell, const VersionInForce& decided, const CompensatedModel* model,
-                         const ChangeId& by) {
-  const std::string content = model == nullptr ? std::string() : serialize(*model);
-  const auto adopted = connection_->in_transaction([&](Database& database) -> Result<int> {
-    lock_cell(database, cell);
-    std::optional<int> version = version_of_hash(database, cell, decided.hash);
-    if (!version && model == nullptr)
-      return failure(ErrorCode::kNotFound, "cell {} has no model {}", cell, decided.hash).of("hash");
-    if (!version) {
-      const auto free = free_version(database, cell, decided.version);
-      if (!free) return free;
-      version = *free;
-      count_version(database, cell, *version);
-      insert_model(database, cell, *version, *model, content);
-      record_audit(database,
-                   {cell, "follow", fmt::format("version {}", *version), "", fmt::format("sha256 {}", decided.hash),
-                    fmt::format("version {} there", decided.version)},
-                   by);
-    } else if (model != nullptr) {
-      mend_model(database, cell, *version, content, by);
-    }
-    const auto present = present_activation(database, cell);
-    if (present && present->version == *version) return *version;
-    insert_activation(database, cell, *version, present ? std::optional(present->number) : std::nullopt);
-    record_audit(database, {cell, "follow", "in force", spoken(present), fmt::format("version {}", *version)}, by);
-    return *version;
-  });
-  if (adopted) copy_after_change(cell);
-  return adopted;
-}
-
-Result<bool> Store::has_model(const std::string& cell, const std::string& hash) const {
-  return connection_->exclusively(
-      [&](Database& database) -> Result<bool> { return version_of_hash(database, cell, hash).has_value(); });
-}
-
 Result<std::optional<InForceRecord>> Store::in_force_record(const std::string& cell) const {
   return connection_->exclusively([&](Database& database) -> Result<std::optional<InForceRecord>> {
     const auto present = present_activation(database, cell);
@@ -321,7 +250,6 @@ Result<int> Store::rollback(const std::string& cell, int steps, const ChangeId& 
     const Activation& wanted = (*before)[static_cast<std::size_t>(steps - 1)];
     const auto present = present_activation(database, cell);
     insert_activation(database, cell, wanted.version, wanted.back);
-    count_decision(database);
     record_audit(database, {cell, "rollback", "in force", spoken(present), fmt::format("version {}", wanted.version)},
                  change_id);
     return ChangeOutcome{wanted.version};

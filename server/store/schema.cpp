@@ -17,18 +17,24 @@ constexpr const char* kModelsWithoutTimes =
 
 /// Also what programs of before have made since, which count none.
 constexpr const char* kCountVersions =
-    "INSERT INTO cells (cell, last_version) SELECT cell, MAX(version) FROM "
-    "(SELECT cell, version FROM models UNION ALL SELECT cell, newest FROM versions_elsewhere) WHERE true GROUP BY cell "
+    "INSERT INTO cells (cell, last_version) SELECT cell, MAX({1}) FROM {0} WHERE true GROUP BY cell "
     "ON CONFLICT (cell) DO UPDATE SET last_version = excluded.last_version "
     "WHERE excluded.last_version > cells.last_version";
 
-/// Damage is an error of what reads the damaged row: the cell's next version.
-void count_versions(Database& database) {
+/// Damage is an error of what reads the damaged row, and not of all.
+void execute_unless_damaged(Database& database, const std::string& statements) {
   try {
-    database.execute(kCountVersions);
+    database.execute(statements);
   } catch (const DatabaseError& error) {
     if (error.kind() != DatabaseError::Kind::kOther) throw;
   }
+}
+
+/// Numbers that a server gave which this one followed stay given.
+void count_versions(Database& database) {
+  execute_unless_damaged(database, fmt::format(kCountVersions, "models", "version"));
+  if (database.has_table("versions_elsewhere"))
+    execute_unless_damaged(database, fmt::format(kCountVersions, "versions_elsewhere", "newest"));
 }
 
 /// Their times, as far as they can be read.
@@ -101,6 +107,7 @@ Status prepare_file(Database& database, const std::string& path) {
   put_cells_of_releases_into_their_key(database);
   fill_in_times(database);
   count_versions(database);
+  execute_unless_damaged(database, kTablesGone);
   prepare_audit(database, schema == 0, schema);
   transaction.commit();
   return {};

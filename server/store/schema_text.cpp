@@ -156,23 +156,6 @@ CREATE TABLE IF NOT EXISTS discarded (
   FOREIGN KEY (cell, batch) REFERENCES batches (cell, id)
 ) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS store_identity (id TEXT NOT NULL);
-CREATE TABLE IF NOT EXISTS replica (
-  one     INTEGER PRIMARY KEY CHECK (one = 1),
-  epoch   INTEGER NOT NULL,
-  writes  INTEGER NOT NULL,
-  follows TEXT    NOT NULL,
-  told    TEXT    NOT NULL
-);
-CREATE TABLE IF NOT EXISTS learned_elsewhere (
-  cell  TEXT NOT NULL,
-  batch TEXT NOT NULL,
-  PRIMARY KEY (cell, batch),
-  FOREIGN KEY (cell, batch) REFERENCES batches (cell, id)
-) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS versions_elsewhere (
-  cell   TEXT    PRIMARY KEY,
-  newest INTEGER NOT NULL
-) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS job_claims (
   job          INTEGER PRIMARY KEY REFERENCES jobs (id),
   server       TEXT    NOT NULL,
@@ -184,6 +167,12 @@ CREATE TABLE IF NOT EXISTS cells (
   cell         TEXT    PRIMARY KEY,
   last_version INTEGER NOT NULL
 ) WITHOUT ROWID;
+)sql";
+
+const char* const kTablesGone = R"sql(
+DROP TABLE IF EXISTS replica;
+DROP TABLE IF EXISTS learned_elsewhere;
+DROP TABLE IF EXISTS versions_elsewhere;
 )sql";
 
 const char* const kAuditTables = R"sql(

@@ -15,11 +15,12 @@ extern const char* const kSchemaAdded;  ///< what version 2 added to version 1
 /// released if its model is put in force. Also which jobs are checks of a robot's health, which look like diagnoses to
 /// programs that know none. How a version was judged when a person put it in force. And the changes that clients asked
 /// for under an id, with what came of them; what of the rest has lost its text; which batches nothing takes any more;
-/// and the store's identity. Of a server among others: which part it has (one row, or none), the batches
-/// that models were made of elsewhere, and the highest numbers of versions there. Which server works on a job,
-/// which start of it (`token`), until when it is believed to live, and who wants the job to end. And of each cell the
-/// highest number that a version was given: its row is what is locked where several servers write.
+/// and the store's identity. Which server works on a job, which start of it (`token`), until when it is believed to
+/// live, and who wants the job to end. And of each cell the highest number that a version was given: its row is what is
+/// locked where several servers write.
 extern const char* const kTablesBeside;
+/// Takes out what servers with stores of their own remembered of each other. Older programs make it anew in a file.
+extern const char* const kTablesGone;
 extern const char* const kAuditTables;
 
 [[nodiscard]] std::string in_sqlite(std::string tables);

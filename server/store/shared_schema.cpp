@@ -17,13 +17,14 @@ struct Migration {
   int works_from;  ///< the oldest schema whose programs work on this one, too
 };
 
-const std::array<Migration, 1>& migrations() {
-  static const std::array<Migration, 1> all = {
+const std::array<Migration, 2>& migrations() {
+  static const std::array<Migration, 2> all = {
       {{in_postgres(std::string(kSchema) + kSchemaAdded + kTablesBeside + kAuditTables) +
             "CREATE TABLE trammel_schema (version BIGINT NOT NULL, works_from BIGINT NOT NULL);"
             "INSERT INTO trammel_schema (version, works_from) VALUES (0, 0);"
             "INSERT INTO store_identity (id) VALUES (replace(CAST(gen_random_uuid() AS TEXT), '-', ''));",
-        1}}};
+        1},
+       {kTablesGone, 2}}};
   return all;
 }
 

@@ -114,34 +114,6 @@ struct KeepRule {
   int answers = 0;  ///< findings of diagnoses that are over
 };
 
-/// What a server among others remembers of its part (server/dds/replicas).
-struct ReplicaRecord {
-  /// Of the last decision that it knows of what is in force. What is put in force here makes it one higher, in the same
-  /// transaction.
-  std::uint64_t epoch = 0;
-  bool writes = false;
-  std::string follows = {};  ///< the server that writes instead; empty: not known
-  std::string told = {};     ///< the part that the server file gave it when this was decided
-  bool operator==(const ReplicaRecord&) const = default;
-};
-
-/// The highest number of a version that another server is believed to have given.
-constexpr int kHighestTold = 1'000'000'000;
-
-/// What a cell is served with, as a replica tells it.
-struct VersionInForce {
-  int version = 0;
-  std::string hash;
-  bool operator==(const VersionInForce&) const = default;
-};
-
-/// What a replica has, at one moment.
-struct ReplicaView {
-  std::optional<ReplicaRecord> record;          ///< empty: this server was never one of several
-  std::map<std::string, VersionInForce> cells;  ///< that have a model in force
-  std::map<std::string, int> newest = {};       ///< the highest number of a version, here or given elsewhere
-};
-
 class StoreConnection;
 
 /// Thread-safe: a file is one connection behind one lock. Every function that changes something is one transaction, and
@@ -209,12 +181,9 @@ class Store {
   [[nodiscard]] Result<StoredBatch> batch(const std::string& cell, const std::string& id) const;
   /// The same without its text: cheap.
   [[nodiscard]] Result<StoredBatch> batch_record(const std::string& cell, const std::string& id) const;
-  /// Takes over what became of the batch on the server that writes: quarantine, discarded and learned. Refuses
-  /// (kNotFound) one that is not here, (kConflict) other content and one that was discarded here and not there.
-  [[nodiscard]] Status take_over_batch(const StoredBatch& there, const ChangeId& by);
   /// How many changes the audit trail has: another number, another state of what it tells of.
   [[nodiscard]] Result<std::int64_t> changes_made() const;
-  /// The ids of the batches that any model of the cell was trained from, here or on the server that this one followed.
+  /// The ids of the batches that any model of the cell was trained from.
   [[nodiscard]] Result<std::set<std::string>> batches_learned_from(const std::string& cell) const;
   /// Puts the batch in quarantine for `reason`, or releases it (empty). Refuses (kConflict) one that was discarded.
   [[nodiscard]] Status set_quarantine(const std::string& cell, const std::string& id, const std::string& reason,
@@ -277,19 +246,6 @@ class Store {
   /// remembers the version that is in force at that moment, even if a rollback put it there.
   [[nodiscard]] Status activate(const std::string& cell, int version, const ChangeId& change_id = {},
                                 const std::optional<JobOutcome>& judged = {});
-  /// Takes over what another server has put in force, under its version number if that is free here: stores the model
-  /// (null: one of this hash is stored already, else kNotFound) and puts it in force. Returns the version. A rollback
-  /// leads to what was in force here before. The epoch of replica_record() stays.
-  [[nodiscard]] Result<int> adopt(const std::string& cell, const VersionInForce& decided, const CompensatedModel* model,
-                                  const ChangeId& by);
-  /// Whether the cell's history has a model of this hash, with its text.
-  [[nodiscard]] Result<bool> has_model(const std::string& cell, const std::string& hash) const;
-  [[nodiscard]] Result<ReplicaView> replica_view() const;
-  /// The next version of the cell made here has a higher number than this one, which another server has given. Refuses
-  /// one above kHighestTold.
-  [[nodiscard]] Status number_after(const std::string& cell, int newest);
-  /// `why`: for the audit trail, where the part changes.
-  [[nodiscard]] Status keep_replica_record(const ReplicaRecord& record, const std::string& why);
   /// Empty: nothing is in force.
   [[nodiscard]] Result<std::optional<InForceRecord>> in_force_record(const std::string& cell) const;
   /// The versions that repeated rollbacks restore, the next one first. kNotFound: there is none.

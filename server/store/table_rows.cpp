@@ -81,7 +81,6 @@ const std::vector<StoreTable> kTables = {
      columns_of({{"number", 'i'}, {"id", 'b'}, {"asked", 'b'}, {"version", 'i'}, {"job", 'i'}, {"made_at", 'i'}})},
     {"pruned", 3, columns_of({{"kind", 'b'}, {"cell", 'b'}, {"id", 'b'}})},
     {"discarded", 2, columns_of({{"cell", 'b'}, {"batch", 'b'}})},
-    {"learned_elsewhere", 2, columns_of({{"cell", 'b'}, {"batch", 'b'}})},
     {"audit", 1,
      columns_of({{"number", 'i'},
                  {"at", 'i'},

@@ -37,12 +37,6 @@ Status check_batch_id(const std::string& id) {
   return check_name(id, "batch");
 }
 
-/// When a batch was accepted, as another server tells it: not later than now.
-std::int64_t accepted_elsewhere(std::int64_t told) {
-  const std::int64_t now = unix_now();
-  return told > 0 ? std::min(told, now) : now;
-}
-
 Status check_most(const char* field, std::size_t asked, std::size_t most, const char* of_what) {
   if (asked <= most) return {};
   return failure(ErrorCode::kTooLarge, "{} {}, limit {}", asked, of_what, most).of(field).beyond(asked, most);
@@ -638,70 +632,6 @@ Result<std::vector<Trainer::DatedJob>> Trainer::jobs(const std::string& cell_nam
     jobs.push_back({job, std::move(*now)});
   }
   return jobs;
-}
-
-void Trainer::set_decides(bool decides) {
-  history_.set_decides(decides);
-  queue_.hold(!decides || !options_.trains);
-}
-
-Result<int> Trainer::adopt(const std::string& cell, const VersionInForce& decided, const std::string& text,
-                           const ChangeId& by) {
-  auto version = history_.adopt(cell, decided, text, by);
-  if (version) end_jobs_done_elsewhere(cell, by.who);
-  return version;
-}
-
-bool Trainer::serves(const std::string& cell, const std::string& hash) const {
-  const auto model = registry_.in_force(cell);
-  return model && model->model.provenance().hash == hash;
-}
-
-void Trainer::end_jobs_done_elsewhere(const std::string& cell, const std::string& by) {
-  const auto model = registry_.in_force(cell);
-  const auto unfinished = store_.unfinished_jobs();
-  if (!model || !unfinished) return;                                           // a promotion trains once more
-  const std::string learned = "+" + model->model.provenance().batch_id + "+";  // several are joined so
-  for (const StoredJob& job : *unfinished) {
-    const auto is_learned = [&](const std::string& batch) {
-      return learned.find("+" + batch + "+") != std::string::npos;
-    };
-    if (job.cell != cell || job.kind != JobKind::kTrain || job.batch_ids.empty()) continue;
-    if (!std::all_of(job.batch_ids.begin(), job.batch_ids.end(), is_learned)) continue;
-    static_cast<void>(end_job_done_elsewhere(job, by + " has learned from it"));  // else a promotion trains once more
-  }
-}
-
-Status Trainer::end_job_done_elsewhere(const StoredJob& job, const std::string& what) {
-  const auto asked_for = was_asked_for(job);
-  if (!asked_for) return tl::make_unexpected(asked_for.error());
-  if (!queue_.remove(job.id)) return {};
-  if (const Status done = store_.set_job_done(job.id, what); !done) {
-    queue_.push_front({job.id, job.cell, *asked_for});  // as if nothing had been said
-    return done;
-  }
-  JobProgress progress = progress_of(job);
-  progress.stage = JobStage::kDone;
-  progress.what = what;
-  book_.report(progress);
-  return {};
-}
-
-Status Trainer::adopt_batch(const StoredBatch& there, const std::string& by) {
-  if (!there.csv.empty()) {
-    StoredBatch copy{there.cell, there.id, there.csv, "", "", accepted_elsewhere(there.accepted_at)};
-    copy.who = by;
-    if (const auto kept = take_in(std::move(copy)); !kept) return tl::make_unexpected(kept.error());
-  }
-  ChangeId change;
-  change.who = by;
-  if (const Status taken = store_.take_over_batch(there, change); !taken) return taken;
-  if (there.outcome.empty()) return {};
-  const auto here = store_.batch_record(there.cell, there.id);
-  if (!here) return tl::make_unexpected(here.error());
-  const auto job = store_.job(here->job);
-  if (!job) return tl::make_unexpected(job.error());
-  return end_job_done_elsewhere(*job, fmt::format("{}: {}", by, there.outcome));
 }
 
 int Trainer::queued_jobs() const { return static_cast<int>(queue_.size()); }

@@ -124,17 +124,6 @@ class Trainer {
   [[nodiscard]] Result<int> import_model(const std::string& cell, const std::string& text, const ChangeId& id = {}) {
     return history_.import_model(cell, text, id);
   }
-  /// Whether what is in force is decided here. Where it is not, jobs wait, and adopt() alone changes what is in force.
-  void set_decides(bool decides);
-  /// Takes over a batch of the server that writes, and what became of it there; without its text: it is here already.
-  /// The training that came with it is over here when it is over there. Refuses as submit() and
-  /// Store::take_over_batch() do.
-  [[nodiscard]] Status adopt_batch(const StoredBatch& there, const std::string& by);
-  /// See ModelHistory. Jobs that wait for batches which the model has learned from are done.
-  [[nodiscard]] Result<int> adopt(const std::string& cell, const VersionInForce& decided, const std::string& text,
-                                  const ChangeId& by);
-  /// Whether this model of the cell is served now.
-  [[nodiscard]] bool serves(const std::string& cell, const std::string& hash) const;
   [[nodiscard]] Result<CompensatedModel> load_for_service(const std::string& cell, int version) const {
     return history_.load_for_service(cell, version);
   }
@@ -156,11 +145,6 @@ class Trainer {
   [[nodiscard]] int queued_jobs() const;
 
  private:
-  /// Ends the trainings that wait and would learn only what the models of the cell have learned.
-  void end_jobs_done_elsewhere(const std::string& cell, const std::string& by);
-  /// One that runs goes on: it ends by itself, and puts nothing in force. Where the store does not take it the job
-  /// waits as before.
-  [[nodiscard]] Status end_job_done_elsewhere(const StoredJob& job, const std::string& what);
   /// Checks the batch (its text, and when it was accepted first), stores it with its job, queues it.
   [[nodiscard]] Result<std::int64_t> take_in(StoredBatch batch);
   /// Loads models in the background, tries a store again that cannot be written, and tells of other troubles than

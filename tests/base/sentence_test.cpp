@@ -111,7 +111,7 @@ TEST(Sentence, OfCellAndServerFiles) {
   EXPECT_EQ(said(read_server_config(server)),
             server +
                 " row 5: dds: prot: unknown key, did you mean port?; known here: domain address allow_network "
-                "without_security security port peer_ports peers discovery_servers compute_workers max_clients "
+                "without_security security port discovery_servers compute_workers max_clients "
                 "client_requests client_mb queued_requests queued_mb cell_share ros2\n" +
                 server + " row 6: log: level: 'loud', expected debug, info, warn, error");
   folder.write("server.yaml", start + "dds: {port: 80}\n");

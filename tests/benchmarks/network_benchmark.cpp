@@ -1,7 +1,6 @@
 // What a bad line and certificates cost: a client on another host asks for one target after the other. How long it
-// waits behind a line that loses, holds back and shuffles frames, or is cut; how soon after a cut a follower on the
-// other host serves what the writer put in force meanwhile; and beside a plain server, what security adds.
-// --only line|cut|replica|security, --seconds N, --cuts N. The client is this program again, --ask.
+// waits behind a line that loses, holds back and shuffles frames, or is cut; and beside a plain server, what security
+// adds. --only line|cut|security, --seconds N, --cuts N. The client is this program again, --ask.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -92,34 +91,24 @@ double count_of(const std::vector<Call>& calls, const std::string& what) {
   return static_cast<double>(std::count_if(calls.begin(), calls.end(), [&](const Call& c) { return c.what == what; }));
 }
 
-/// Of several servers: on which host it is, and what its file says more.
-struct Part {
-  std::size_t host = 0;
-  std::string lines, dds;
-};
-
-/// A daemon with a model (or that follows another one), on `hosts` or on this one.
+/// A daemon, on the first of `hosts` or on this one.
 class Service {
  public:
-  Service(const test::TwoHosts* hosts, const std::string& security, const Part& part = {})
-      : hosts_(hosts), security_(security), part_(part), daemon_(static_cast<int>(part.host)) {
+  Service(const test::TwoHosts* hosts, const std::string& security) : hosts_(hosts), security_(security) {
     std::string dds = security.empty() ? "without_security: true" : "security: " + security + "/line-3";
     if (hosts != nullptr) dds += fmt::format(", address: {}, allow_network: true", host());
     const std::string text = test::read_file(daemon_.config_path());
     static_cast<void>(test::demand(
-        write_text_file(daemon_.config_path(), fmt::format("{}{}dds: {{{}{}}}\n", text, part.lines, dds, part.dds))
-            .map([] { return true; })));
-    service_ = std::make_unique<test::Process>(on(part_.host, daemon_.command_line()));
+        write_text_file(daemon_.config_path(), fmt::format("{}dds: {{{}}}\n", text, dds)).map([] { return true; })));
+    service_ = std::make_unique<test::Process>(on(0, daemon_.command_line()));
     if (!service_->wait_for_line("ready", kLimit)) fail(service_->standard_error());
   }
 
-  [[nodiscard]] std::string name() const { return daemon_.name(); }
   [[nodiscard]] std::string place() const { return fmt::format("{}:{}", host(), daemon_.port()); }
   void learn(std::uint64_t seed = 3) const {
     const std::string batch = folder_.write(fmt::format("batch{}.csv", seed), test::virtual_batch_csv(150, seed));
     tell({"submit", "--cell", "cell-7", "--batch", batch, "--watch"});
   }
-  void activate(int version) const { tell({"activate", "--model", fmt::format("cell-7@{}", version)}); }
 
   /// A client of the other host.
   [[nodiscard]] std::unique_ptr<test::Process> asker(int most_seconds, int requests) const {
@@ -148,7 +137,7 @@ class Service {
     fmt::print(stderr, "{}\n", why);
     std::exit(1);
   }
-  [[nodiscard]] std::string host() const { return hosts_ != nullptr ? hosts_->address(part_.host) : "127.0.0.1"; }
+  [[nodiscard]] std::string host() const { return hosts_ != nullptr ? hosts_->address(0) : "127.0.0.1"; }
   [[nodiscard]] std::vector<std::string> on(std::size_t host, std::vector<std::string> argv) const {
     return hosts_ != nullptr ? hosts_->on(host, std::move(argv)) : argv;
   }
@@ -157,13 +146,12 @@ class Service {
     words.insert(words.begin(), TRAMMEL_BINARY_DIR "/clients/trammel");
     words.insert(words.end(), {"--host", place(), "--domain", std::to_string(daemon_.domain())});
     if (!security_.empty()) words.insert(words.end(), {"--security", security_ + "/measuring"});
-    const auto done = test::run(on(part_.host, words), kLimit);
+    const auto done = test::run(on(0, words), kLimit);
     if (done.exit_code.value_or(99) > 1) fail(done.out + done.err);
   }
 
   const test::TwoHosts* hosts_;
   const std::string security_;
-  const Part part_;
   test::Daemon daemon_;
   test::TemporaryFolder folder_;
   std::unique_ptr<test::Process> service_;
@@ -216,42 +204,11 @@ void tell_cuts(int cuts) {
   test::tell_figure("cut of 5 s: wrong answers", wrong);
 }
 
-/// From the end of a cut, in which the writer put another model in force, to the follower's first answer by it, s,
-/// each.
-void tell_followed_cuts(int cuts) {
-  test::TwoHosts hosts(kBadLine);
-  if (!made(hosts)) return;
-  const Service writer(&hosts, "", {0, "replica: {role: writer}\n", ""});
-  for (const std::uint64_t seed : {3, 4}) writer.learn(seed);
-  writer.activate(1);
-  const Service follower(&hosts, "",
-                         {1, fmt::format("replica: {{role: follower, of: {}}}\n", writer.name()),
-                          fmt::format(", peers: [\"{}\"]", writer.place())});
-  double longest = 0, wrong = 0;
-  for (int i = 0; i < cuts; ++i) {
-    const auto process = follower.asker(15, 0);
-    static_cast<void>(process->wait_for_line("right", kLimit));
-    const auto until = hosts.cut_for(seconds(5));
-    writer.activate(2 - i % 2);
-    static_cast<void>(process->wait(kLimit));
-    double took = 99;
-    for (const Call& call : calls_in(process->standard_output())) {
-      const double after = 1e-9 * static_cast<double>(call.ended - until.time_since_epoch().count());
-      if (call.what == "wrong" && after < 0) ++wrong;
-      if (call.what == "wrong" && after > 0) took = std::min(took, after);
-    }
-    fmt::print("cut {}: the follower serves the writer's model {:.2f} s after it\n", i + 1, took);
-    longest = std::max(longest, took);
-  }
-  test::tell_figure("cut of 5 s: longest until a follower serves the writer's model, s", longest);
-  test::tell_figure("cut of 5 s: a follower's wrong answers", wrong);
-}
-
 void tell_security(int requests) {
   const test::TemporaryFolder folder;
   const std::string keys = TRAMMEL_SOURCE_DIR "/deploy/security/keys", plant = folder.file("plant");
   bool issued = test::run({keys, "init", plant}).exit_code == 0;
-  for (const auto& [role, name] : {std::pair("replica", "line-3"), {"cam", "office"}, {"engineer", "measuring"}})
+  for (const auto& [role, name] : {std::pair("server", "line-3"), {"cam", "office"}, {"engineer", "measuring"}})
     issued = issued && test::run({keys, "issue", plant, role, name}).exit_code == 0;
   if (!issued) return static_cast<void>(fmt::print("skipped: no certificates can be made here\n"));
   std::vector<double> ratios;
@@ -290,7 +247,6 @@ int main(int argc, char** argv) {
   if (!asked.host.empty()) return trammel::ask(asked);
   if (only.empty() || only == "line") trammel::tell_line(asked.most_seconds);
   if (only.empty() || only == "cut") trammel::tell_cuts(cuts);
-  if (only.empty() || only == "replica") trammel::tell_followed_cuts(cuts);
   if (only.empty() || only == "security") trammel::tell_security(2000);
   return 0;
 }

@@ -51,7 +51,6 @@ TEST_F(ServerConfigTest, WhatShipsSaysTheDefaults) {
   EXPECT_EQ(shipped->dds.domain, minimal.dds.domain);
   EXPECT_EQ(shipped->dds.address, minimal.dds.address);
   EXPECT_EQ(shipped->dds.port, minimal.dds.port);
-  EXPECT_EQ(shipped->dds.peer_ports, minimal.dds.peer_ports);
   EXPECT_EQ(shipped->dds.compute_workers, minimal.dds.compute_workers);
   EXPECT_EQ(shipped->dds.max_clients, minimal.dds.max_clients);
   EXPECT_EQ(shipped->dds.client_requests, minimal.dds.client_requests);
@@ -60,7 +59,6 @@ TEST_F(ServerConfigTest, WhatShipsSaysTheDefaults) {
   EXPECT_EQ(shipped->dds.queued_mb, minimal.dds.queued_mb);
   EXPECT_EQ(shipped->dds.cell_share, minimal.dds.cell_share);
   EXPECT_FALSE(shipped->dds.ros2);
-  EXPECT_EQ(shipped->dds.replica, minimal.dds.replica);
   EXPECT_EQ(shipped->dds.record, minimal.dds.record);
   EXPECT_EQ(shipped->trainer.queue_capacity, minimal.trainer.queue_capacity);
   EXPECT_EQ(shipped->trainer.max_poses, minimal.trainer.max_poses);
@@ -114,7 +112,7 @@ TEST_F(ServerConfigTest, LetsNoNodesInBesideSecurityWhereTheyHaveNoRole) {
 TEST_F(ServerConfigTest, ReadsEveryKey) {
   const ServerConfig config = read(
       "models_in_memory_mb: 512\n"
-      "dds: {domain: 3, address: 127.0.0.2, port: 18000, peer_ports: [18002, 18004], compute_workers: 4, "
+      "dds: {domain: 3, address: 127.0.0.2, port: 18000, compute_workers: 4, "
       "max_clients: 7, client_requests: 8, client_mb: 90, queued_requests: 10, queued_mb: 110, cell_share: 0.75, ros2: "
       "true}\n"
       "trainer: {queue_capacity: 2, max_poses: 300, validation_share: 0.3, accept_ratio: 1.5, seed: 9, memory_mb: 64, "
@@ -130,7 +128,6 @@ TEST_F(ServerConfigTest, ReadsEveryKey) {
   EXPECT_EQ(config.dds.domain, 3u);
   EXPECT_EQ(config.dds.address, "127.0.0.2");
   EXPECT_EQ(config.dds.port, 18000);
-  EXPECT_EQ(config.dds.peer_ports, (std::vector<std::uint16_t>{18002, 18004}));
   EXPECT_EQ(config.dds.compute_workers, 4);
   EXPECT_EQ(config.dds.max_clients, 7);
   EXPECT_EQ(config.dds.client_requests, 8);
@@ -157,18 +154,20 @@ TEST_F(ServerConfigTest, RefusesUnknownDoubledAndMissingKeys) {
   EXPECT_EQ(refusal_of("server: a\ncells: [cell-7.yaml]\nstore: t.db\n"), at(1, "version").beyond(0, 1));
 }
 
+TEST_F(ServerConfigTest, APartAmongServersThatFollowEachOtherIsRefusedWithWhatToDoInstead) {
+  for (const char* part : {"replica: {role: follower, of: b}\n", "replica: null\n"}) {
+    const auto refused = read_server_config(folder_.write("server.yaml", kMinimal + part));
+    ASSERT_FALSE(refused) << part;
+    EXPECT_EQ(refused.error().field, "replica");
+    EXPECT_NE(sentence(refused.error()).find("`store: postgresql://...`"), std::string::npos)
+        << sentence(refused.error());
+  }
+}
+
 TEST_F(ServerConfigTest, RefusesValuesOutOfRangeAndSaysTheLimit) {
   EXPECT_EQ(refusal_for("dds: {port: 80}\n"), at(5, "dds: port").beyond(80, 1024));
   EXPECT_EQ(refusal_for("dds: {domain: 233}\n"), at(5, "dds: domain").beyond(233, 232));
-  EXPECT_EQ(refusal_for("dds: {peer_ports: [17500]}\n"), at(5, "dds: peer_ports").value(17500));
-  EXPECT_EQ(refusal_for("dds: {peer_ports: [1e4]}\n"), at(5, "dds: peer_ports").text("1e4"));
   EXPECT_EQ(refusal_for("dds: {compute_workers: 0}\n"), at(5, "dds: compute_workers").beyond(0, 1));
-  EXPECT_EQ(refusal_for("replica: {role: boss}\n"), at(5, "replica: role").text("boss"));
-  EXPECT_EQ(refusal_for("replica: {role: follower, of: a}\n"), at(5, "replica: of").text("a"));
-  EXPECT_EQ(refusal_for("replica: {role: follower}\n"), at(5, "replica: of"));
-  EXPECT_EQ(refusal_for("replica: {role: writer, of: b}\n"), at(5, "replica: of").text("b"));
-  EXPECT_EQ(refusal_for("replica: {role: writer, promote_after_s: 1}\n"),
-            at(5, "replica: promote_after_s").beyond(1, 3));
   EXPECT_EQ(refusal_for("record: {folder: r, max_mb: 1}\n"), at(5, "record: max_mb").beyond(1, 8));
   EXPECT_EQ(refusal_for("trainer: {validation_share: 0}\n"), at(5, "trainer: validation_share").beyond(0, 0.05));
   EXPECT_EQ(refusal_for("trainer: {accept_ratio: -1}\n"), at(5, "trainer: accept_ratio").beyond(-1, 0.1));
@@ -216,12 +215,6 @@ TEST_F(ServerConfigTest, RefusesAnAddressThatLeavesTheHostUnlessThatIsMeant) {
   const ServerConfig secured = read("dds: {address: 192.168.1.5, allow_network: true, security: keys}\n");
   EXPECT_EQ(secured.dds.address, "192.168.1.5");
   EXPECT_EQ(secured.dds.security, folder_.file("keys"));
-}
-
-TEST_F(ServerConfigTest, ReplicasElsewhereAreNamedWithTheirPortOrHaveTheUsualOne) {
-  const std::vector<HostPort> expected = {{"10.1.0.4", 17500}, {"10.1.0.5", 17502}};
-  EXPECT_EQ(read("dds: {peers: [10.1.0.4, '10.1.0.5:17502']}\n").dds.peers, expected);
-  EXPECT_EQ(refusal_for("dds: {peers: ['10.1.0.5:80']}\n"), at(5, "dds: peers").text("10.1.0.5:80"));
 }
 
 TEST_F(ServerConfigTest, DiscoveryServersAreFewDifferentAndWithinReach) {

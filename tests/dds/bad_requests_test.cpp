@@ -344,7 +344,6 @@ std::size_t BadRequests::trainings() {
   expect("a rule", wire::RESULT_UNSUPPORTED, [](Request& r) { r.batch_rule("the last three"); });
   expect("a prior", wire::RESULT_UNSUPPORTED, [](Request& r) { r.prior("fleet"); });
   expect("a diagnosis that is done", wire::RESULT_UNSUPPORTED, [](Request& r) { r.diagnosis(1); });
-  expect("an epoch", wire::RESULT_UNSUPPORTED, [](Request& r) { r.change().expected_epoch(7); });
   expect("another version than in force", wire::RESULT_CONFLICT, [](Request& r) {
     r.batch_ids({"lt-07"});
     r.change().expected_version(2);

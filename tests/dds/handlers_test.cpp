@@ -656,9 +656,6 @@ TEST_F(HandlersTest, WhatIsNotBuiltYetSaysSoAndChangesNothing) {
   auto forced = manage_request(wire::MANAGE_ROLLBACK);
   forced.force(true);
   EXPECT_TRUE(is_unsupported(handlers_.answer(forced)));
-  auto of_epoch = manage_request(wire::MANAGE_ACTIVATE, 1);
-  of_epoch.change().expected_epoch(3);
-  EXPECT_TRUE(is_unsupported(handlers_.answer(of_epoch)));
   wire::TrainRequest train;
   train.batch_rule("last 3");
   EXPECT_TRUE(is_unsupported(handlers_.answer(train)));

@@ -196,32 +196,6 @@ TEST(SafeType, TheShapeOfEveryReplyAndStateIsThatOfItsType) {
   status.cells({"cell-7", "c"});
   status.trouble("the disk is full");
   expect_shape<ServiceStatusTopic::Type>(status);
-  ReplicaStatus replica;
-  replica.role(REPLICA_FOLLOWER);
-  replica.follows("trammel-1");
-  replica.cells().resize(2);
-  replica.cells()[1].cell("cell-7");
-  replica.cells()[1].hash("ab");
-  replica.cells()[1].newest(4);
-  replica.trouble("two write");
-  expect_shape<ReplicaStatusTopic::Type>(replica);
-  BatchCopy copy;
-  copy.to("trammel-2");
-  copy.cell("cell-7");
-  copy.batch_id("lt-07");
-  copy.hash("ab");
-  copy.csv("q1_deg\n1\n");
-  copy.quarantine("discarded: a bump");
-  copy.discarded(true);
-  copy.learned(true);
-  copy.outcome("it does not fit");
-  copy.accepted_at_unix_s(1'650'000'000);
-  expect_shape<BatchCopyTopic::Type>(copy);
-  BatchCopied copied;
-  copied.result(RESULT_MALFORMED);
-  copied.why("the disk is full");
-  expect_shape<BatchCopiedTopic::Type>(copied);
-  expect_shape<ModelSnapshotTopic::Type>(ModelSnapshot());
 }
 
 TEST(SafeType, AHostileLengthIsRefusedBeforeMemoryIsAskedFor) {

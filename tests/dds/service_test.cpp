@@ -689,15 +689,15 @@ TEST_F(ServiceTest, TellsWhoServesWhat) {
   EXPECT_EQ(models->front().version, 6);
 }
 
-TEST_F(ServiceTest, AnotherReplicaAnswersWhenOneHasGone) {
+TEST_F(ServiceTest, AnotherServerAnswersWhenOneHasGone) {
   DdsOptions options = server_.options();
   options.server_id = "server-b";
   options.port = static_cast<std::uint16_t>(options.port + 2);
-  Server replica(options);
+  Server other(options);
   server_.backend().serve(1);
-  replica.backend().serve(2);
+  other.backend().serve(2);
   server_.start();
-  replica.start();
+  other.start();
   auto session = client::Session::open({options.domain, {server_.options().port, options.port}, kLimit});
   ASSERT_TRUE(session) << session.error().message;
   EXPECT_EQ((*session)->servers().value().size(), 2u);

@@ -119,12 +119,6 @@ TEST(WireDocument, TellsTheQosOfEveryTopic) {
       told_of("<Operation>_2_Reply", "server", call_writer_qos(kReplyDepth), call_reader_qos(kReplyDepth)),
       told_of(topic_name(ServiceStatusTopic::kName), "server", service_status_writer_qos(), state_reader_qos()),
       told_of(topic_name(ModelStatusTopic::kName), "server", state_writer_qos(), state_reader_qos()),
-      told_of(topic_name(ModelSnapshotTopic::kName), "server", state_writer_qos(), state_reader_qos()),
-      told_of(topic_name(ReplicaStatusTopic::kName), "server", state_writer_qos(), state_reader_qos()),
-      told_of(topic_name(BatchCopyTopic::kName), "server", call_writer_qos(kReplyDepth),
-              call_reader_qos(kRequestDepth)),
-      told_of(topic_name(BatchCopiedTopic::kName), "server", call_writer_qos(kReplyDepth),
-              call_reader_qos(kRequestDepth)),
       told_of(topic_name(TrainingProgressTopic::kName), "server", progress_writer_qos(), progress_reader_qos())};
   std::vector<Row> told;
   for (const Row& row : rows()) {

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <future>
 #include <set>
 
 #include "server/base/text_file.h"
@@ -134,6 +135,35 @@ TEST_F(Fleet, AHostThatWasStoppedWhileAnotherDidItsJobStoresNothingWhenItGoesOn)
   const auto models = session->models("cell-7");
   ASSERT_TRUE(models) << sentence(models.error());
   EXPECT_EQ(models->size(), 2U) << "one model of each job";
+}
+
+TEST_F(Fleet, WhenAServerIsKilledTheOtherAnswersAtOnceAndWithTheSameModel) {
+  start(first_);
+  start(second_);
+  const auto session = session_with({&first_, &second_}), other = session_with({&second_});
+  ASSERT_TRUE(end_of(*session, submit(*session, "b1", 1)).in_force);
+  wait_until([&] { return served(*other) == 1; }, "the other one serves it");
+  for (int i = 0; i < 20; ++i) ASSERT_EQ(served(*session), 1);
+  first_.kill();
+  const auto answer = session->predict_error(kContext, test::virtual_joints(3, 7));
+  ASSERT_TRUE(answer) << sentence(answer.error());
+  EXPECT_EQ(answer->model.batch_id, "b1");
+}
+
+TEST_F(Fleet, StoppingAndStartingOneAfterTheOtherLosesNoRequest) {
+  start(first_);
+  start(second_);
+  const auto session = session_with({&first_, &second_}), other = session_with({&second_});
+  ASSERT_TRUE(end_of(*session, submit(*session, "b1", 1)).in_force);
+  wait_until([&] { return served(*other) == 1; }, "the other one serves it");
+  for (test::Daemon* daemon : {&first_, &second_}) {
+    auto restarted = std::async(std::launch::async, [daemon] {
+      EXPECT_EQ(daemon->stop(), 0);
+      daemon->start();
+    });
+    for (int asked = 0; asked < 200 || restarted.wait_for(seconds(0)) != std::future_status::ready; ++asked)
+      ASSERT_EQ(served(*session), 1) << asked;
+  }
 }
 
 TEST_F(Fleet, WhileTheRecordIsAwayPredictionsGoOnAndNothingAcknowledgedIsLost) {

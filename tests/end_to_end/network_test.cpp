@@ -96,7 +96,7 @@ TEST_F(NetworkTest, AfterItsInterfaceWasGoneTheServiceAnswersAgain) {
 TEST_F(NetworkTest, WithCertificatesTheOtherHostIsServedAndWithoutItIsNot) {
   const std::string keys = TRAMMEL_SOURCE_DIR "/deploy/security/keys", plant = folder_.file("plant");
   ASSERT_EQ(test::run({keys, "init", plant}).exit_code, 0);
-  ASSERT_EQ(test::run({keys, "issue", plant, "replica", "line-3"}).exit_code, 0);
+  ASSERT_EQ(test::run({keys, "issue", plant, "server", "line-3"}).exit_code, 0);
   ASSERT_EQ(test::run({keys, "issue", plant, "observer", "office"}).exit_code, 0);
   start("security: " + plant + "/participants/line-3");
   const auto plain = elsewhere({"status", "--timeout", "3"});
@@ -110,7 +110,7 @@ TEST_F(NetworkTest, WithCertificatesTheOtherHostIsServedAndWithoutItIsNot) {
 TEST_F(NetworkTest, WhatSomebodyOnTheLineSendsAgainHappensOnce) {
   const std::string keys = TRAMMEL_SOURCE_DIR "/deploy/security/keys", plant = folder_.file("plant");
   ASSERT_EQ(test::run({keys, "init", plant}).exit_code, 0);
-  ASSERT_EQ(test::run({keys, "issue", plant, "replica", "line-3"}).exit_code, 0);
+  ASSERT_EQ(test::run({keys, "issue", plant, "server", "line-3"}).exit_code, 0);
   ASSERT_EQ(test::run({keys, "issue", plant, "engineer", "office"}).exit_code, 0);
   start("security: " + plant + "/participants/line-3");
   const std::string office = plant + "/participants/office";

@@ -62,7 +62,7 @@ class SecurityTest : public testing::Test {
  protected:
   void SetUp() override {
     const std::string text = test::read_file(daemon_.config_path());
-    ASSERT_TRUE(write_text_file(daemon_.config_path(), text + "dds: {security: " + keys().of("replica", "line-3") +
+    ASSERT_TRUE(write_text_file(daemon_.config_path(), text + "dds: {security: " + keys().of("server", "line-3") +
                                                            "}\nhttp: {port: " + std::to_string(http()) + "}\n"));
   }
   [[nodiscard]] std::uint16_t http() const { return static_cast<std::uint16_t>(daemon_.port() + 1); }
@@ -131,7 +131,7 @@ const Calls& calls() {
 }
 
 const std::map<std::string, std::set<std::string>> kMay = {
-    {"replica", {}},  // it answers
+    {"server", {}},  // it answers
     {"observer", {"ReadModels"}},
     {"cam", {"ReadModels", "PredictError", "CorrectTarget"}},
     {"metrologist", {"ReadModels", "PredictError", "CorrectTarget", "SubmitMeasurements", "Diagnose", "CheckHealth"}},
@@ -347,7 +347,7 @@ TEST_F(SecurityTest, TheLogNamesWhoIsRefusedAlsoWhatTheStopCutsShort) {
 
 TEST_F(SecurityTest, AServiceWithTheCertificateOfAClientIsToldWhichRoleItNeeds) {
   const std::string text = test::read_file(daemon_.config_path());
-  const std::string folder = keys().of("cam", "cam-1"), service = keys().of("replica", "line-3");
+  const std::string folder = keys().of("cam", "cam-1"), service = keys().of("server", "line-3");
   ASSERT_TRUE(
       write_text_file(daemon_.config_path(), std::string(text).replace(text.find(service), service.size(), folder)));
   for (const bool check : {true, false}) {
@@ -355,7 +355,7 @@ TEST_F(SecurityTest, AServiceWithTheCertificateOfAClientIsToldWhichRoleItNeeds) 
     if (check) words.push_back("--check");
     const auto done = test::run(words);
     EXPECT_EQ(done.exit_code, 3);
-    EXPECT_NE(done.err.find("CN=cam-1,O=Trammel has the role cam, and a service needs the role replica"),
+    EXPECT_NE(done.err.find("CN=cam-1,O=Trammel has the role cam, and a service needs the role server"),
               std::string::npos)
         << done.err;
     EXPECT_EQ(done.err.find("ServiceStatus"), std::string::npos) << done.err;

@@ -229,7 +229,7 @@ std::string read_server_file(std::string_view bytes) {
 std::vector<std::string> server_files() {
   return {
       "version: 1\nserver: a\ncells: [cell-7.yaml]\nstore: t.db\n"
-      "dds: {domain: 3, address: 127.0.0.1, port: 17500, peer_ports: [17502], compute_workers: 2, max_clients: 9}\n"
+      "dds: {domain: 3, address: 127.0.0.1, port: 17500, compute_workers: 2, max_clients: 9}\n"
       "trainer: {queue_capacity: 4, max_poses: 2000, validation_share: 0.2, accept_ratio: 1.05, seed: 1}\n"
       "log: {level: info, file: log.txt}\n"};
 }
@@ -330,10 +330,6 @@ const std::vector<Target>& targets() {
       type_target<wire::ModelStatusTopic::Type>("model_status"),
       type_target<wire::TrainingProgressTopic::Type>("training_progress"),
       type_target<wire::ServiceStatusTopic::Type>("service_status"),
-      type_target<wire::ModelSnapshotTopic::Type>("model_snapshot"),
-      type_target<wire::ReplicaStatusTopic::Type>("replica_status"),
-      type_target<wire::BatchCopyTopic::Type>("batch_copy"),
-      type_target<wire::BatchCopiedTopic::Type>("batch_copied"),
       request_target<wire::PredictError>("ask_predict_error"),
       request_target<wire::CorrectTarget>("ask_correct_target"),
       request_target<wire::SubmitMeasurements>("ask_submit_measurements"),

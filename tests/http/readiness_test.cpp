@@ -187,15 +187,6 @@ TEST_F(ReadinessTest, AStoreThatCannotBeWrittenIsNotedAndTheCellStaysReady) {
   EXPECT_NE(now.told["notes"][0].get<std::string>().find("cannot be"), std::string::npos);
 }
 
-TEST_F(ReadinessTest, WhatIsWrongAmongReplicasIsNotedAndTheCellStaysReady) {
-  train("b1", 1);
-  server_.figures.replica = ReplicaFigures{.troubles = {"follow", "name"}};
-  const Readiness now = ready();
-  EXPECT_TRUE(now.ready) << now.told;
-  EXPECT_EQ(now.told["notes"], (nlohmann::json{"a model that the writing replica has in force is not served here",
-                                               "another replica has this one's name"}));
-}
-
 TEST_F(ReadinessTest, AStoreThatCannotBeReadIsNotedWhereCopiesOfItsModelsAreServed) {
   train("b1", 1);
   server_.take_down();

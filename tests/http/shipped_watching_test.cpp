@@ -34,7 +34,6 @@ std::set<std::string> names_told() {
   server.figures.queues = {{"reads", 0}};
   server.figures.dropped_packets = {{"fragment", 0}};
   server.figures.work = {{"cell-7", {}}};
-  server.figures.replica.emplace();
   server.figures.not_recorded = 0;
   // Of a batch whose rows have no times the age of the data is not known.
   const Watched watched = server.watched();
@@ -163,7 +162,7 @@ TEST(ShippedWatching, PromtoolTakesTheRulesAndTheConfigurationAndTheRulesFireWhe
        {std::vector<std::string>{"promtool", "check", "rules", kFolder + "alerts.yml"},
         std::vector<std::string>{"promtool", "check", "config", kFolder + "prometheus.yml"},
         std::vector<std::string>{"promtool", "test", "rules",
-                                 TRAMMEL_SOURCE_DIR "/tests/http/alerts_of_replicas.yml"}}) {
+                                 TRAMMEL_SOURCE_DIR "/tests/http/alerts_of_the_store.yml"}}) {
     const auto done = test::run({"/usr/bin/env", command[0], command[1], command[2], command[3]});
     EXPECT_EQ(done.exit_code, 0) << done.out << done.err;
   }

@@ -126,7 +126,7 @@ TEST_F(StoreFaults, AStoreOfBeforeThatAFullDiskKeepsFromBeingTakenOnIsServedFrom
   open();
   put_in_force(1);
   store_.reset();
-  SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("DROP TABLE versions_elsewhere; DROP TABLE learned_elsewhere");
+  SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("DROP TABLE cells; DROP TABLE discarded");
   disk.refuse_writing(SQLITE_FULL);
   open();
   EXPECT_EQ(served(), 1);

@@ -170,8 +170,23 @@ TEST_F(SharedStore, ASchemaOfTheFutureIsRefusedUnlessItSaysThatThisProgramWorksO
   ASSERT_FALSE(newer);
   EXPECT_EQ(newer.error().field, "schema");
   EXPECT_EQ(newer.error().value, 7);
-  say("UPDATE trammel_schema SET version = 7, works_from = 1");
+  say("UPDATE trammel_schema SET version = 7, works_from = 2");
   EXPECT_TRUE(Store::open(url_)) << "a rolling update";
+}
+
+TEST_F(SharedStore, ASchemaOfBeforeIsBroughtUpToDateByInitAndByNothingElse) {
+  say("CREATE TABLE replica (epoch bigint); CREATE TABLE learned_elsewhere (cell text); "
+      "CREATE TABLE versions_elsewhere (cell text); UPDATE trammel_schema SET version = 1, works_from = 1");
+  const auto older = Store::open(url_);
+  ASSERT_FALSE(older);
+  EXPECT_NE(sentence(older.error()).find("trammel store init"), std::string::npos) << sentence(older.error());
+  ASSERT_TRUE(init_store(url_));
+  EXPECT_TRUE(Store::open(url_));
+  EXPECT_EQ(postgres_.sql(url_,
+                          "SELECT count(*) FROM pg_tables WHERE tablename IN ('replica', 'learned_elsewhere', "
+                          "'versions_elsewhere')"),
+            "0\n");
+  EXPECT_EQ(postgres_.sql(url_, "SELECT version || ' ' || works_from FROM trammel_schema"), "2 2\n");
 }
 
 TEST_F(SharedStore, ARoleThatMayOnlyUseItCannotChangeTheAuditTrail) {

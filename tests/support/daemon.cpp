@@ -28,7 +28,7 @@ std::string cell_with_a_bias() {
 
 std::string trammeld_path() { return TRAMMEL_BINARY_DIR "/server/trammeld"; }
 
-Daemon::Daemon(int replica) : port_(static_cast<std::uint16_t>(own_ports() + 2 * replica)), domain_(own_domain()) {
+Daemon::Daemon(int number) : port_(static_cast<std::uint16_t>(own_ports() + 2 * number)), domain_(own_domain()) {
   folder_.write("cell-7.yaml", cell_with_a_bias());
   folder_.write(
       "server.yaml",

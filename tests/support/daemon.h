@@ -18,8 +18,8 @@ namespace trammel::test {
 /// time has (own_ports()). May be stopped, killed and started again on the same store.
 class Daemon {
  public:
-  /// `replica`: the second one (1) of a test, on the port beside the first one's (0).
-  explicit Daemon(int replica = 0);
+  /// `number`: the second one (1) of a test, on the port beside the first one's (0).
+  explicit Daemon(int number = 0);
 
   /// Until it says that it is ready; fails the test when it does not.
   void start();

@@ -162,19 +162,6 @@ TEST_F(TrainerFaults, WhereTheModelInForceIsDamagedTheNewestGoodOneIsServedAndTh
   EXPECT_TRUE(trainer_->activate("cell-8", 1));
 }
 
-TEST_F(TrainerFaults, AFollowerThatCannotLoadWhatTheWriterDecidedDoesNotCountItAsInForce) {
-  add_models("cell-7", 2);
-  start();
-  trainer_->set_decides(false);
-  const auto models = demand(store_->models("cell-7"));
-  const auto first = std::find_if(models.begin(), models.end(), [](const auto& one) { return one.version == 1; });
-  ASSERT_NE(first, models.end());
-  damage("version = 1");
-  EXPECT_FALSE(trainer_->adopt("cell-7", {1, first->hash}, "", ChangeId()));
-  EXPECT_EQ(served(), 2);
-  EXPECT_EQ(demand(store_->version_in_force("cell-7")), 2) << "it would be told to others as followed";
-}
-
 TEST_F(TrainerFaults, ACellWithoutAnyGoodModelIsDarkAndTheOthersAreNot) {
   add_models("cell-7", 2);
   add_models("cell-8", 1);

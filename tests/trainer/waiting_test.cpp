@@ -152,21 +152,6 @@ TEST_F(Waiting, AModelOfAnyCellCanBePutInForceWhileAnotherOneIsJudged) {
   EXPECT_GT(judging.passed(), before) << "what is in force has changed meanwhile: it is judged against that";
 }
 
-TEST_F(Waiting, AJobThatRunsWhereAnotherServerIsOverWithItEndsByItselfAndPutsNothingInForce) {
-  train_all();
-  judging.shut();
-  const std::int64_t third = submit("cell-7", "third", 3);
-  ASSERT_TRUE(judging.somebody_waits());
-  trainer_->set_decides(false);
-  StoredBatch there = test::demand(store_->batch_record("cell-7", "third"));
-  there.outcome = "in force";
-  EXPECT_TRUE(trainer_->adopt_batch(there, "writer"));
-  judging.open();
-  const JobProgress over = finished(third);
-  EXPECT_EQ(over.stage, JobStage::kDone) << over.what;
-  EXPECT_FALSE(over.in_force);
-}
-
 TEST_F(Waiting, AModelOfOneCellCanBePutInForceWhileThatOfAnotherIsPublished) {
   train_all();
   publishing_.shut();

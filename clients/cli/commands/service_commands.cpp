@@ -114,13 +114,6 @@ Result<Extent> retrain(client::Session& session, const ServiceArguments& argumen
 
 bool is_checked(const ordered_json& cell) { return cell.contains("verdict") && cell["verdict"].is_string(); }
 
-/// What the servers say one after the other may look divergent for a moment: only what stays so is.
-std::vector<std::string> lasting_divergence(client::Session& session) {
-  const auto servers = session.servers_when(
-      [](const std::vector<client::ServerStatus>& all) { return divergence_of(all).empty(); }, std::chrono::seconds(2));
-  return servers ? divergence_of(*servers) : std::vector<std::string>();
-}
-
 /// What a server that answers does besides, as far as it says so.
 ordered_json part_of(const std::string& server, const std::vector<ordered_json>& answers) {
   ordered_json part = {{"serves", true}, {"trains", nullptr}, {"reachable", true}};
@@ -156,12 +149,9 @@ Status status(client::Session& session, const ServiceArguments& arguments) {
   }
   const ordered_json record = record_of(*answers);
   text += record_text(record);
-  const std::vector<std::string> divergent = lasting_divergence(session);
-  for (const std::string& one : divergent) text += "divergent: " + one + "\n";
   tell(text + models_text(*models) + checked + jobs_text(*jobs) + quarantine_text(*apart), {arguments.json});
   return write_json(arguments.json, {{"record", record},
                                      {"servers", list},
-                                     {"divergent", divergent},
                                      {"models", models_json(*models)},
                                      {"health", health},
                                      {"jobs", jobs_json(*jobs)},

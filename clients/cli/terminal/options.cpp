@@ -29,7 +29,7 @@ void add_service_options(CLI::App& command, ServiceOptions& options, const std::
   command
       .add_option(
           "--host", options.hosts,
-          "Where the service runs: a name or IPv4 address, with :PORT behind it or not; once for each replica on "
+          "Where the service runs: a name or IPv4 address, with :PORT behind it or not; once for each server on "
           "another host")
       ->allow_extra_args(false)
       ->capture_default_str()
@@ -38,7 +38,7 @@ void add_service_options(CLI::App& command, ServiceOptions& options, const std::
   add_discovery_option(command, options);
   command
       .add_option("--port", options.ports,
-                  "UDP port of the service on each host that is named without one; once for each replica")
+                  "UDP port of the service on each host that is named without one; once for each server")
       ->allow_extra_args(false)
       ->capture_default_str()
       ->group("Service");

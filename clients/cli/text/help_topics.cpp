@@ -73,7 +73,7 @@ constexpr std::array kTopics = {
         "  deploy/supervise trammeld --config config/server.yaml\n"
         "  trammel status\n"
         "\n"
-        "It looks at --host 127.0.0.1, --port 17500, --domain 0. Once --port for each replica. Where a discovery "
+        "It looks at --host 127.0.0.1, --port 17500, --domain 0. Once --port for each server. Where a discovery "
         "server runs (dds: discovery_servers of the server file), --discovery-server HOST instead: it tells where "
         "services are. trammel doctor says "
         "what is in the way where nothing answers."},

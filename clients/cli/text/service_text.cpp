@@ -145,59 +145,11 @@ std::string models_text(const std::vector<client::ModelInfo>& models) {
   return text;
 }
 
-namespace {
-
-/// Which part it has, and what it serves.
-std::string replica_text(const std::string& server, const client::ReplicaPart& replica) {
-  const std::string part = replica.writes            ? "writes"
-                           : replica.follows.empty() ? "follows nobody"
-                                                     : "follows " + replica.follows;
-  std::string cells;
-  for (const client::ServedVersion& cell : replica.cells)
-    cells += cell.version == 0 ? fmt::format(" {} without a model", cell.cell)
-                               : fmt::format(" {}@{} ({})", cell.cell, cell.version, cell.hash.substr(0, 8));
-  return fmt::format("server {} {}, epoch {}, serves{}\n", server, part, replica.epoch, cells);
-}
-
-ordered_json replica_json(const client::ReplicaPart& replica) {
-  ordered_json cells = ordered_json::array();
-  for (const client::ServedVersion& cell : replica.cells)
-    cells.push_back({{"cell", cell.cell}, {"version", cell.version}, {"hash", cell.hash}});
-  return {{"role", replica.writes ? "writer" : "follower"},
-          {"follows", replica.follows},
-          {"epoch", replica.epoch},
-          {"cells", cells}};
-}
-
-void compare(const client::ServerStatus& a, const client::ServerStatus& b, std::vector<std::string>& said) {
-  for (const client::ServedVersion& one : a.replica->cells) {
-    for (const client::ServedVersion& other : b.replica->cells) {
-      if (one.cell != other.cell || one.hash == other.hash || one.version == 0 || other.version == 0) continue;
-      said.push_back(fmt::format("cell {}: {} serves version {} and {} version {}, both at epoch {}, and they differ",
-                                 one.cell, a.server_id, one.version, b.server_id, other.version, a.replica->epoch));
-    }
-  }
-}
-
-}  // namespace
-
-std::vector<std::string> divergence_of(const std::vector<client::ServerStatus>& servers) {
-  std::vector<std::string> said;
-  for (std::size_t i = 0; i < servers.size(); ++i) {
-    for (std::size_t j = i + 1; j < servers.size(); ++j) {
-      const auto &a = servers[i].replica, &b = servers[j].replica;
-      if (a && b && a->epoch == b->epoch) compare(servers[i], servers[j], said);
-    }
-  }
-  return said;
-}
-
 std::string server_text(const client::ServerStatus& server) {
   return fmt::format("server {} {}: {}, up {:.0f} s, {} requests ({} refused), {} jobs queued, cells: {}\n",
                      server.server_id, server.version, server.state, server.uptime_s, server.requests, server.refused,
                      server.queued_jobs,
                      server.cells.empty() ? "none" : fmt::format("{}", fmt::join(server.cells, " "))) +
-         (server.replica ? replica_text(server.server_id, *server.replica) : "") +
          (server.trouble.empty() ? "" : fmt::format("server {} in trouble: {}\n", server.server_id, server.trouble));
 }
 
@@ -215,8 +167,7 @@ ordered_json server_json(const client::ServerStatus& server) {
           {"lost", server.lost},
           {"trouble", server.trouble},
           {"uptime_s", server.uptime_s},
-          {"queued_jobs", server.queued_jobs},
-          {"replica", server.replica ? replica_json(*server.replica) : ordered_json(nullptr)}};
+          {"queued_jobs", server.queued_jobs}};
 }
 
 std::string record_text(const ordered_json& record) {

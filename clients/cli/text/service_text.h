@@ -22,9 +22,6 @@ namespace trammel::cli {
 [[nodiscard]] nlohmann::ordered_json server_json(const client::ServerStatus& server);
 [[nodiscard]] std::string server_text(const client::ServerStatus& server);
 
-/// Cells that two replicas serve with different models though both have the same decisions: one sentence each.
-[[nodiscard]] std::vector<std::string> divergence_of(const std::vector<client::ServerStatus>& servers);
-
 /// Of `record` as a server says it; empty where that is a file beside the server.
 [[nodiscard]] std::string record_text(const nlohmann::ordered_json& record);
 

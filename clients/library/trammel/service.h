@@ -18,7 +18,7 @@ namespace trammel::api {
 /// Where the service is.
 struct SessionOptions {
   std::uint32_t domain = 0;                    ///< DDS domain, 0 to 232
-  std::vector<std::uint16_t> ports = {17500};  ///< UDP ports on each host that is named without one, one per replica
+  std::vector<std::uint16_t> ports = {17500};  ///< UDP ports on each host that is named without one, one per server
   std::chrono::milliseconds timeout{5000};     ///< of one request, discovery included
   /// The hosts of the service, names or IPv4 addresses, with `:port` behind them or not. Empty: this host, on
   /// 127.0.0.1.

@@ -28,17 +28,6 @@ JobOutcome outcome_of(const GateVerdict& verdict) {
   return outcome;
 }
 
-/// The model that is stored with this hash.
-Result<ServedModelPtr> load_by_hash(const Store& store, ModelRegistry& registry, const std::string& cell,
-                                    const std::string& hash) {
-  const auto stored = store.models(cell);
-  if (!stored) return tl::make_unexpected(stored.error());
-  for (const StoredModel& one : *stored) {
-    if (one.hash == hash) return registry.version(cell, one.version);
-  }
-  return failure(ErrorCode::kNotFound, "cell {} has no model {}", cell, hash).of("hash");
-}
-
 }  // namespace
 
 ModelHistory::ModelHistory(const CellBook& cells, Store& store, ModelRegistry& registry)
@@ -141,7 +130,6 @@ Status ModelHistory::activate(const std::string& cell, int version, const Change
   const auto made_meanwhile = store_.outcome_of(id);
   if (!made_meanwhile) return tl::make_unexpected(made_meanwhile.error());
   if (*made_meanwhile) return {};
-  if (auto decides = check_decides(cell); !decides) return decides;
   const std::optional<JobOutcome> figures = judged ? std::optional(outcome_of(*judged)) : std::nullopt;
   if (auto activated = store_.activate(cell, version, id, figures); !activated) return activated;
   if (registry_.version_in_force(cell) != version) put_in_force(std::move(*model));
@@ -196,7 +184,6 @@ Result<int> ModelHistory::rollback(const std::string& cell, const ChangeId& id) 
     if (!found) return tl::make_unexpected(found.error());
     const MutexLock lock(changes_of(cell));
     if (const auto now = way_back(cell); !now || *now != *way) continue;
-    if (auto decides = check_decides(cell); !decides) return tl::make_unexpected(decides.error());
     ChangeId decided = id;
     if (!decided.expected_version) decided.expected_version = way->version_now;
     const auto restored = store_.rollback(cell, found->first, decided);
@@ -224,37 +211,6 @@ Result<CompensatedModel> ModelHistory::model_from(const std::string& cell, const
   const Status fits = check_fits_cell(*model, **served, fmt::format("{} {}", what, id));
   if (!fits) return tl::make_unexpected(fits.error());
   return model;
-}
-
-Result<int> ModelHistory::adopt(const std::string& cell, const VersionInForce& decided, const std::string& text,
-                                const ChangeId& by) {
-  std::optional<CompensatedModel> model;
-  if (!text.empty()) {
-    auto read = model_from(cell, text, "model of another server");
-    if (!read) return tl::make_unexpected(read.error());
-    if (read->provenance().hash != decided.hash)
-      return refused("cell {}: its hash is {}, not {} as told", cell, read->provenance().hash, decided.hash).of("hash");
-    model = std::move(*read);
-  }
-  if (const auto served = find_cell(cells_.now(), cell); !served) return tl::make_unexpected(served.error());
-  // Before it is remembered: a model that cannot be loaded must not count as in force.
-  ServedModelPtr stored;
-  if (!model) {
-    auto loaded = load_by_hash(store_, registry_, cell, decided.hash);
-    if (!loaded) return tl::make_unexpected(loaded.error());
-    stored = std::move(*loaded);
-  }
-  const MutexLock lock(changes_of(cell));
-  if (decides_) return failure(ErrorCode::kConflict, "cell {}: this server decides itself", cell).of("cell");
-  const auto version = store_.adopt(cell, decided, model ? &*model : nullptr, by);
-  if (!version || registry_.version_in_force(cell) == *version) return version;
-  put_in_force(stored ? std::move(stored) : registry_.reclaimed({cell, *version, std::move(*model)}));
-  return version;
-}
-
-Status ModelHistory::check_decides(const std::string& cell) const {
-  if (decides_) return {};
-  return failure(ErrorCode::kConflict, "cell {}: another server decides what is in force", cell).of("server");
 }
 
 Result<int> ModelHistory::import_model(const std::string& cell, const std::string& text, const ChangeId& id) {
@@ -329,12 +285,6 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate, const Judging& judgi
 
 Result<Kept> ModelHistory::store(const Candidate& candidate, Judged judged) {
   const std::string& cell = candidate.job.cell;
-  if (judged.put_in_force && !decides_) {
-    judged.put_in_force = judged.release = false;
-    judged.outcome.verdict = JobVerdict::kUndecided;
-    judged.outcome.why = "another server decides now what is in force";
-    judged.message = fmt::format("not in force: {} ({})", judged.outcome.why, judged.message);
-  }
   ChangeId decided;
   // Of a store with one server the cell's lock says the same.
   if (judged.put_in_force && store_.is_shared()) decided.expected_version = registry_.version_in_force(cell);

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <map>
 #include <memory>
@@ -98,13 +97,6 @@ class ModelHistory {
   /// An error: that is not known, or it cannot be read now.
   Status follow(const std::string& cell);
 
-  /// What another server decides: false, and nothing goes in force here but by adopt(). At the start: true.
-  void set_decides(bool decides) { decides_ = decides; }
-  /// Puts in force what another server has put in force; returns the version here. `text`: its model file; empty: the
-  /// history has that model already (else kNotFound). Refuses what import_model() refuses, and another hash.
-  [[nodiscard]] Result<int> adopt(const std::string& cell, const VersionInForce& decided, const std::string& text,
-                                  const ChangeId& by);
-
   /// Stores the model, ends its job and, if `judging` says so, puts it in force. What the job may release leaves
   /// quarantine where the model goes in force, and where too few poses can judge it. It is judged without its cell's
   /// lock, again where something else went in force meanwhile; after a few times with the lock. Refuses (kBusy) once
@@ -112,8 +104,6 @@ class ModelHistory {
   [[nodiscard]] Result<Kept> keep(const Candidate& candidate, const Judging& judging, const std::stop_token& stop = {});
 
  private:
-  /// Refuses (kConflict) where another server decides. The cell's lock is held.
-  [[nodiscard]] Status check_decides(const std::string& cell) const;
   /// A model file from elsewhere for this cell.
   [[nodiscard]] Result<CompensatedModel> model_from(const std::string& cell, const std::string& text,
                                                     const char* what) const;
@@ -159,7 +149,6 @@ class ModelHistory {
   Store& store_;
   ModelRegistry& registry_;
   Listener listener_;
-  std::atomic<bool> decides_ = true;
   RecentPoses recent_poses_;
   Mutex changing_mutex_;
   std::map<std::string, Mutex> changing_
