@@ -295,6 +295,7 @@ void shape(CdrWalk& walk, Of<ServiceStatus>) {
   walk.wides(8);
   walk.longs(1);
   sentence(walk, "trouble");
+  token(walk, "record");
 }
 
 }  // namespace

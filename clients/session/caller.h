@@ -24,9 +24,10 @@ namespace trammel::client {
 /// To which server a call goes, and how it is repeated.
 struct Route {
   std::string cell;                ///< preferred: a server that serves this cell
-  std::string server;              ///< only to this one; empty: any
-  bool changes_something = false;  ///< a repeat goes to the same server if it can: that one recognises it
+  std::string server;              ///< only to this one, or to another one of its record as `record` says; empty: any
+  bool changes_something = false;  ///< a repeat goes to the same server, or where that one has left to its record
   bool may_be_long = false;  ///< an answer from the record: silence for a moment does not mean that nobody is there
+  std::string record = {};   ///< of `server`, where any server of the same record can answer for it; else empty
 };
 
 /// One operation of a session: a request writer, a reply reader in the session's partition, and the calls that wait.
@@ -101,36 +102,43 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
       : publisher_(publisher), subscriber_(subscriber), partition_(std::move(partition)), watch_(watch) {}
 
   /// The times that a request is sent. What all servers answer alike is asked of a second one where the first is silent
-  /// for kHedge, or leaves. At half of the time it is sent once more; what changes something to the same server, or to
-  /// another one where that one has left: servers of one record make a change once under its id.
-  enum class Sending { kFirst, kHedge, kAgain };
+  /// for kHedge, or leaves. At half of the time it is sent once more; what changes something to the same server, or,
+  /// where that one has left, to another one of its record: those make a change once under its id. Once more where who
+  /// was asked has left only then.
+  enum class Sending { kFirst, kHedge, kAgain, kOfOthers };
+  struct Asked {
+    std::set<std::string> participants;
+    std::string first, last;  ///< servers
+    std::string record;       ///< of the last one; empty: its own
+  };
 
   Result<Reply> attempt(Request& request, const Route& route, Clock::time_point deadline) {
     const auto half = Clock::now() + (deadline - Clock::now()) / 2;
     const bool hedges = !route.changes_something && !route.may_be_long && route.server.empty();
-    std::set<std::string> asked;  // participants
-    std::string first, last;      // servers
-    for (const Sending sending : {Sending::kFirst, Sending::kHedge, Sending::kAgain}) {
-      if (sending == Sending::kHedge && (!hedges || first.empty())) continue;
-      if (const auto server = find_server(sending, route, has_left(asked) ? std::string() : last,
-                                          sending == Sending::kAgain ? deadline : half)) {
-        last = server->id();
-        if (first.empty()) first = last;
-        asked.insert(server->participant);
-        request.header().server(last);
+    Asked asked;
+    for (const Sending sending : {Sending::kFirst, Sending::kHedge, Sending::kAgain, Sending::kOfOthers}) {
+      if (sending == Sending::kHedge && (!hedges || asked.first.empty())) continue;
+      if (sending == Sending::kOfOthers && !has_left(asked.participants)) break;
+      const bool is_late = sending == Sending::kAgain || sending == Sending::kOfOthers;
+      if (const auto server = find_server(sending, route, asked, is_late ? deadline : half)) {
+        asked.last = server->id();
+        if (asked.first.empty()) asked.first = asked.last;
+        asked.record = server->status.record().to_string();
+        asked.participants.insert(server->participant);
+        request.header().server(asked.last);
         request.header().deadline_ms(milliseconds_until(deadline));
         if (!writer_->write(&request)) {
           return failure(ErrorCode::kTooLarge, "{}: the request is too large", Operation::kName);
         }
       }
-      auto until = sending == Sending::kAgain ? deadline : half;
+      auto until = is_late ? deadline : half;
       if (sending == Sending::kFirst && hedges) until = std::min(until, Clock::now() + kHedge);
-      if (auto reply = wait_for_reply(request.header().request_id().sequence_number(), asked, until)) {
-        if (reply->header().server().to_string() != first) watch_.was_slow(first);
+      if (auto reply = wait_for_reply(request.header().request_id().sequence_number(), asked.participants, until)) {
+        if (reply->header().server().to_string() != asked.first) watch_.was_slow(asked.first);
         return *std::move(reply);
       }
     }
-    return unanswered(last);
+    return unanswered(asked.last);
   }
 
   /// Whether nobody of them is there any more.
@@ -141,19 +149,26 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
     });
   }
 
-  /// `last`: the one that was asked; empty: nobody, or it has left.
-  [[nodiscard]] std::optional<KnownServer> find_server(Sending sending, const Route& route, const std::string& last,
+  [[nodiscard]] std::optional<KnownServer> find_server(Sending sending, const Route& route, const Asked& asked,
                                                        Clock::time_point until) {
     if (sending == Sending::kHedge)
-      return watch_.another_server(route.cell, last,
+      return watch_.another_server(route.cell, asked.last,
                                    [&](const auto& known) { return reachable(known.participant, true); });
     // The repeat may also go to a server whose reply writer is not matched yet: it may have had too many clients.
     const bool and_back = sending == Sending::kFirst;
-    const std::string only = route.server.empty() && route.changes_something ? last : route.server;
-    return watch_.wait_for_server(
-        route.cell, route.changes_something ? std::string() : last, until, [&](const KnownServer& known) {
-          return (only.empty() || only == known.id()) && reachable(known.participant, and_back);
-        });
+    const std::string avoided = route.changes_something || has_left(asked.participants) ? std::string() : asked.last;
+    return watch_.wait_for_server(route.cell, avoided, until, [&](const KnownServer& known) {
+      return may_answer(known, route, asked) && reachable(known.participant, and_back);
+    });
+  }
+
+  [[nodiscard]] bool may_answer(const KnownServer& known, const Route& route, const Asked& asked) const {
+    const auto shares = [&](const std::string& record) {
+      return !record.empty() && known.status.record().to_string() == record;
+    };
+    if (!route.server.empty() && route.server != known.id() && !shares(route.record)) return false;
+    if (!route.changes_something || asked.last.empty() || asked.last == known.id()) return true;
+    return shares(asked.record) && serves(known, route.cell) && has_left(asked.participants);
   }
 
   /// Waits until it is there, or all that were asked have left.

@@ -65,14 +65,10 @@ void ServerWatch::wait_for_first(MutexLock& lock, Clock::time_point deadline, co
   changed_.wait_until(lock, deadline, [&]() TRAMMEL_REQUIRES(mutex_) { return found() || in_vain(); });
 }
 
-namespace {
-
 bool serves(const KnownServer& server, const std::string& cell) {
   const auto& cells = server.status.cells();
   return std::find(cells.begin(), cells.end(), cell) != cells.end();
 }
-
-}  // namespace
 
 bool ServerWatch::is_settled(const KnownServer& chosen, const std::string& cell) const {
   if (cell.empty() || serves(chosen, cell)) return true;
@@ -125,6 +121,12 @@ const KnownServer* ServerWatch::choose(const std::string& cell, const std::strin
     if (best == nullptr || merit(server) > merit(*best)) best = &server;
   }
   return best;
+}
+
+std::string ServerWatch::record_of(const std::string& server) const {
+  const MutexLock lock(mutex_);
+  const auto found = records_.find(server);
+  return found == records_.end() ? std::string() : found->second;
 }
 
 void ServerWatch::wait_until(Clock::time_point time) {
@@ -218,6 +220,7 @@ void ServerWatch::on_status(const wire::ServiceStatus* status, const std::string
     const MutexLock lock(mutex_);
     if (status != nullptr) {
       servers_[status->server().to_string()] = {participant, *status, Clock::now(), written_s};
+      records_[status->server().to_string()] = status->record().to_string();
     } else {
       std::erase_if(servers_, [&](const auto& entry) { return entry.second.participant == participant; });
     }

@@ -29,6 +29,8 @@ struct KnownServer {
   [[nodiscard]] std::string id() const { return status.server().to_string(); }
 };
 
+[[nodiscard]] bool serves(const KnownServer& server, const std::string& cell);
+
 /// A server of another contract.
 struct OtherServer {
   std::string id, program_version;
@@ -63,6 +65,8 @@ class ServerWatch {
   void was_slow(const std::string& server);
   /// Why no server is found, where the only ones that are there speak another contract than this program.
   [[nodiscard]] std::optional<Error> other_contract() const;
+  /// What the record of the server is told from any other by, also where it has left; empty: it has one of its own.
+  [[nodiscard]] std::string record_of(const std::string& server) const;
   /// Lets the time pass.
   void wait_until(Clock::time_point time);
   /// Call when the result of `reachable` may have changed: waiting calls look again.
@@ -107,6 +111,7 @@ class ServerWatch {
   std::map<std::string, OtherServer> others_ TRAMMEL_GUARDED_BY(mutex_);  // by participant
   std::optional<Clock::time_point> others_since_ TRAMMEL_GUARDED_BY(mutex_);
   std::map<std::string, KnownServer> servers_ TRAMMEL_GUARDED_BY(mutex_);     // by id
+  std::map<std::string, std::string> records_ TRAMMEL_GUARDED_BY(mutex_);     // by id, also of those that have left
   std::map<std::string, Clock::time_point> slow_ TRAMMEL_GUARDED_BY(mutex_);  // by id
   std::map<std::pair<std::string, std::string>, KnownModel> models_
       TRAMMEL_GUARDED_BY(mutex_);  // by participant and cell

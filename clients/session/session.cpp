@@ -221,7 +221,7 @@ struct Session::Participant {
     request.action(action);
     request.change(to_wire(change));
     request.reason(change.reason);
-    return call<wire::ManageModels>(request, {cell, server, true});
+    return call<wire::ManageModels>(request, {cell, server, true, false, record_of(server)});
   }
 
   [[nodiscard]] Result<std::int64_t> release(const std::string& cell, const std::vector<std::string>& batch_ids,
@@ -235,12 +235,16 @@ struct Session::Participant {
     return accepted(*reply);
   }
 
-  /// From `server`; empty: from any.
+  /// From `server`, or from another one of its `record`; empty: from any.
   [[nodiscard]] Result<wire::ReadModelsReply> read(const std::string& cell, const std::string& server,
-                                                   wire::ReadKind what, wire::ReadModelsRequest request = {}) {
+                                                   wire::ReadKind what, wire::ReadModelsRequest request = {},
+                                                   const std::string& record = {}) {
     request.about().cell(cell);
     request.what(what);
-    return call<wire::ReadModels>(request, {cell, server, false, true});
+    return call<wire::ReadModels>(request, {cell, server, false, true, record});
+  }
+  [[nodiscard]] std::string record_of(const std::string& server) const {
+    return server.empty() ? std::string() : watch->record_of(server);
   }
 
   /// From every server.
@@ -268,11 +272,11 @@ struct Session::Participant {
     return not_answered(failure(ErrorCode::kUnreachable, "no server found ({})", where_it_looked()).value());
   }
 
-  /// What `server` (empty: any) knows of the job.
+  /// What `server`, or another one of its record, knows of the job.
   [[nodiscard]] Result<wire::Job> job(const std::string& server, std::int64_t number) {
     wire::ReadModelsRequest request;
     request.job(number);
-    auto reply = read({}, server, wire::READ_JOB, std::move(request));
+    auto reply = read({}, server, wire::READ_JOB, std::move(request), record_of(server));
     if (!reply) return tl::make_unexpected(reply.error());
     if (reply->jobs().size() != 1) return failure(ErrorCode::kInternal, "server {} answered no job", server);
     return reply->jobs().front();
@@ -310,25 +314,16 @@ struct Session::Participant {
     std::optional<std::pair<std::string, wire::Job>> found;
     Error last = no_server();
     for (const std::string& server : may_have(number)) {
+      const std::string record = record_of(server);
+      if (found && !record.empty() && record == record_of(found->first)) continue;
       auto asked = job_of_cell(server, number, cell);
       if (!asked) last = asked.error();
       if (!asked) continue;
-      if (found && is_same(found->second, *asked)) continue;
       if (found) return ambiguous(number, found->first, server);
       found = std::pair(server, std::move(*asked));
     }
     if (!found) return tl::make_unexpected(last);
     return *std::move(found);
-  }
-  /// The job as another server tells it that has the same record; empty: none does.
-  [[nodiscard]] std::optional<std::pair<std::string, wire::Job>> same_job(const wire::Job& wanted,
-                                                                          const std::string& not_of) {
-    for (const KnownServer& server : watch->wait_for_servers(options.servers.size(), Clock::now())) {
-      if (server.id() == not_of) continue;
-      auto asked = job(server.id(), wanted.number());
-      if (asked && is_same(wanted, *asked)) return std::pair(server.id(), std::move(*asked));
-    }
-    return std::nullopt;
   }
   [[nodiscard]] Result<wire::Job> job_of_cell(const std::string& server, std::int64_t number, const std::string& cell) {
     auto asked = job(server, number);
@@ -507,7 +502,8 @@ Result<DiagnosisAnswer> Session::diagnosis(const std::string& cell, std::int64_t
   wire::ReadModelsRequest request;
   request.job(job);
   request.page(page);
-  auto reply = participant_->read(cell, found->first, wire::READ_FINDINGS, std::move(request));
+  auto reply = participant_->read(cell, found->first, wire::READ_FINDINGS, std::move(request),
+                                  participant_->record_of(found->first));
   if (!reply) return tl::make_unexpected(reply.error());
   return DiagnosisAnswer{std::move(reply->text()), std::move(reply->page_html()), from_wire(reply->in_force())};
 }
@@ -694,8 +690,8 @@ Result<JobStatus> Session::wait_for_job(std::int64_t job, std::chrono::milliseco
   const auto deadline = Clock::now() + limit;
   const auto found = participant_->find_job(job);
   if (!found) return tl::make_unexpected(found.error());
-  auto [server, last] = *found;
-  JobStatus status = status_of(last);
+  const std::string& server = found->first;
+  JobStatus status = status_of(found->second);
   std::uint64_t seen = 0;
   while (true) {
     if (listener) listener(status);
@@ -711,17 +707,12 @@ Result<JobStatus> Session::wait_for_job(std::int64_t job, std::chrono::milliseco
       news = participant_->watch->wait_for_progress(server, job, seen, std::min(deadline, Clock::now() + kJobPoll));
       if (news) continue;
       const auto asked = participant_->job(server, job);
-      if (asked) {
-        news = *asked;
-      } else if (asked.error().code != ErrorCode::kUnreachable) {
-        return tl::make_unexpected(asked.error());
-      } else if (auto other = participant_->same_job(last, server)) {
-        std::tie(server, news) = std::move(*other);
-        seen = 0;
-      }
+      const bool may_come = !asked && (asked.error().code == ErrorCode::kUnreachable ||
+                                       asked.error().code == ErrorCode::kBusy);  // a record that is away
+      if (!asked && !may_come) return tl::make_unexpected(asked.error());
+      if (asked) news = *asked;
     }
-    last = *news;
-    status = status_of(last);
+    status = status_of(*news);
   }
 }
 

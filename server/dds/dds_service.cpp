@@ -247,6 +247,7 @@ class DdsService::Running {
           const StateTopics& topics, std::unique_ptr<StatusEcho> echo)
       : options_(options),
         trainer_(trainer),
+        store_(store),
         registry_(registry),
         handlers_(trainer, store, registry),
         port_(std::move(port)),
@@ -376,6 +377,7 @@ class DdsService::Running {
     status.unreadable(*core_.unreadable);
     status.lost(core_.counts.lost);
     status.trouble(cut(fmt::format("{}", fmt::join(trainer_.troubles(), "; ")), wire::MAX_SENTENCE));
+    status.record(store_.shared_identity());
     status.uptime_s(std::chrono::duration<double>(Clock::now() - started_).count());
     status.queued_jobs(trainer_.queued_jobs());
     topics_.publish(std::move(status));
@@ -384,6 +386,7 @@ class DdsService::Running {
   const DdsOptions options_;
   const Clock::time_point started_ = Clock::now();
   Trainer& trainer_;
+  const Store& store_;
   const ModelRegistry& registry_;
   Handlers handlers_;
   PortLock port_;

@@ -86,7 +86,7 @@ class Handlers {
   [[nodiscard]] Result<std::int64_t> trained(const wire::TrainRequest& request);
   /// The version activated, gone back to or imported; 0: none.
   [[nodiscard]] Result<int> changed(const std::string& cell, const wire::ManageModelsRequest& request);
-  [[nodiscard]] Status cancel(const std::string& cell, std::int64_t job, const std::string& who);
+  [[nodiscard]] Status cancel(const std::string& cell, std::int64_t job, const ChangeId& by);
   /// The job, or 0.
   [[nodiscard]] Result<std::int64_t> released(const std::string& cell, const wire::ReleaseBatchesRequest& request);
   [[nodiscard]] Result<wire::ReadModelsReply> read(const std::string& cell,

@@ -34,7 +34,9 @@ Result<int> Handlers::changed(const std::string& cell, const wire::ManageModelsR
       return trainer_.import_model(cell, text, under(in_few_words("import", cell, {text})));
     }
     case wire::MANAGE_CANCEL_JOB:
-      return cancel(cell, request.job(), who(request.header())).map([] { return 0; });
+      return cancel(cell, request.job(), under(fmt::format("cancel job {} of {}", request.job(), cell))).map([] {
+        return 0;
+      });
     default:
       return trainer_
           .activate(cell, request.version(), under(fmt::format("activate {}@{}", cell, request.version())),
@@ -43,12 +45,12 @@ Result<int> Handlers::changed(const std::string& cell, const wire::ManageModelsR
   }
 }
 
-Status Handlers::cancel(const std::string& cell, std::int64_t job, const std::string& who) {
+Status Handlers::cancel(const std::string& cell, std::int64_t job, const ChangeId& by) {
   const auto asked = trainer_.progress(job);
   if (!asked) return tl::make_unexpected(asked.error());
   if (asked->cell != cell)
     return failure(ErrorCode::kNotFound, "job {} is not of cell {}", job, cell).of("job").with_value(job);
-  return trainer_.cancel(job, who);
+  return trainer_.cancel(job, by);
 }
 
 Result<wire::ReleaseBatchesReply> Handlers::answer(const wire::ReleaseBatchesRequest& request) {

@@ -2,8 +2,10 @@
 #include <random>
 
 #include "server/store/cell_rows.h"
+#include "server/store/changes.h"
 #include "server/store/claim_rows.h"
 #include "server/store/connection.h"
+#include "server/store/job_rows.h"
 #include "server/store/statements.h"
 #include "server/store/store.h"
 
@@ -67,10 +69,7 @@ Status check_held(Database& database, const Worker& worker, std::int64_t job, bo
 }
 
 Status claim_job(Database& database, const Worker& worker, std::int64_t job) {
-  const std::string cell = [&] {
-    auto row = prepare(database, "SELECT cell FROM jobs WHERE id = $1", job);
-    return row.next() ? row.text(0) : std::string();
-  }();
+  const std::string cell = cell_of_job(database, job);
   lock_cell(database, cell);
   lock_job(database, job);
   if (const Status free = check_free(database, worker, cell); !free) return free;
@@ -108,15 +107,19 @@ Result<ClaimState> Store::renew_claim(std::int64_t job) {
   });
 }
 
-Status Store::ask_to_cancel(std::int64_t job, const std::string& who) {
-  return connection_->in_transaction([&](Database& database) -> Status {
+Status Store::ask_to_cancel(std::int64_t job, const ChangeId& by) {
+  const auto ask = [&](Database& database) -> Result<ChangeOutcome> {
     const int asked = change(database,
                              "UPDATE job_claims SET cancelled_by = $1 WHERE job = $2 AND job IN "
                              "(SELECT id FROM jobs WHERE state = 'running')",
-                             who, job);
-    if (asked == 1) return {};
+                             by.who, job);
+    if (asked == 1) return ChangeOutcome{0, job};
     return failure(ErrorCode::kConflict, "job {} is not worked on", job).of("job").with_value(job);
+  };
+  const auto asked = connection_->in_transaction([&](Database& database) {
+    return once(database, cell_of_job(database, job), by, [&] { return ask(database); });
   });
+  return asked.map([](const ChangeOutcome&) {});
 }
 
 Result<std::set<std::int64_t>> Store::jobs_to_take() const {

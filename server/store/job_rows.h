@@ -17,6 +17,8 @@ void insert_job_batches(Database& database, std::int64_t job, const std::string&
                         const std::vector<std::string>& batch_ids);
 /// kConflict.
 [[nodiscard]] Failure discarded_failure(const std::string& cell, const std::string& id);
+/// Empty: there is no such job.
+[[nodiscard]] std::string cell_of_job(Database& database, std::int64_t job);
 /// kNotFound: there is none.
 [[nodiscard]] Result<StoredJob> read_job(Database& database, std::int64_t id);
 /// Marks an unfinished job of `cell` (empty: any) done; kNotFound: there is none.

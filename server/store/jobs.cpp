@@ -158,6 +158,11 @@ void insert_job_batches(Database& database, std::int64_t job, const std::string&
   }
 }
 
+std::string cell_of_job(Database& database, std::int64_t job) {
+  auto row = prepare(database, "SELECT cell FROM jobs WHERE id = $1", job);
+  return row.next() ? row.text(0) : std::string();
+}
+
 Result<StoredJob> read_job(Database& database, std::int64_t id) {
   auto row = prepare(database, (std::string(kJobColumns) + "WHERE id = $1").c_str(), id);
   if (!row.next()) return failure(ErrorCode::kNotFound, "job {} does not exist", id).of("job").with_value(id);
@@ -203,9 +208,7 @@ Result<StoredJob> insert_job_over(Database& database, const StoredJob& job) {
 /// The end of a job that made no model.
 void record_job_end(Database& database, std::int64_t id, const std::string& verdict, const std::string& message,
                     const ChangeId& by) {
-  auto row = prepare(database, "SELECT cell FROM jobs WHERE id = $1", id);
-  const std::string cell = row.next() ? row.text(0) : "";
-  record_audit(database, {cell, "job", fmt::format("job {}", id), "open", verdict, message}, by);
+  record_audit(database, {cell_of_job(database, id), "job", fmt::format("job {}", id), "open", verdict, message}, by);
 }
 
 const char* asked_for(JobKind kind) {
@@ -372,9 +375,10 @@ Status Store::set_job_queued(std::int64_t id, bool attempt_counts) {
 }
 
 Status Store::set_job_failed(std::int64_t id, const std::string& message, const JobOutcome& outcome,
-                             const std::string& who) {
-  return connection_->in_transaction([&](Database& database) -> Status {
-    if (const Status held = check_held(database, connection_->worker, id); !held) return held;
+                             const ChangeId& by) {
+  const auto fail = [&](Database& database) -> Result<ChangeOutcome> {
+    if (const Status held = check_held(database, connection_->worker, id); !held)
+      return tl::make_unexpected(held.error());
     return changed_one(change(database,
                               "UPDATE jobs SET state = 'failed', message = $1 "
                               "WHERE id = $2 AND state IN ('queued', 'running')",
@@ -382,9 +386,14 @@ Status Store::set_job_failed(std::int64_t id, const std::string& message, const 
                        id)
         .map([&] {
           record_end(database, id, outcome);
-          record_job_end(database, id, to_text(outcome.verdict), message, {"", "", who});
+          record_job_end(database, id, to_text(outcome.verdict), message, by);
+          return ChangeOutcome{0, id};
         });
+  };
+  const auto failed = connection_->in_transaction([&](Database& database) {
+    return once(database, cell_of_job(database, id), by, [&] { return fail(database); });
   });
+  return failed.map([](const ChangeOutcome&) {});
 }
 
 Status Store::set_job_done(std::int64_t id, const std::string& message, const JobOutcome& outcome) {

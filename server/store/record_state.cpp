@@ -22,6 +22,8 @@ std::string survived_by_commit(Database& database) {
 
 const std::string& Store::server() const { return connection_->worker.server; }
 
+std::string Store::shared_identity() const { return is_shared() ? connection_->copies->store() : std::string(); }
+
 RecordState Store::record() const {
   const StoreState now = state();
   RecordState record;

@@ -123,6 +123,11 @@ Status ServedCopies::belong_to(const std::string& store, bool served) {
   return {};
 }
 
+std::string ServedCopies::store() const {
+  const MutexLock lock(mutex_);
+  return store_;
+}
+
 std::string ServedCopies::folder(const std::string& cell) const {
   const std::string all = folder();
   return all.empty() ? "" : all + "/" + sha256_hex(cell).substr(0, kCellDigits);

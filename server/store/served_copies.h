@@ -38,6 +38,8 @@ class ServedCopies {
   /// Takes copies away that were put in force later: of a history that is no more.
   void forget_after(const std::string& cell, std::int64_t activation) const;
   [[nodiscard]] const std::string& root() const { return root_; }
+  /// Whose copies they are; empty: not known yet.
+  [[nodiscard]] std::string store() const;
 
  private:
   /// Of the store's copies; empty: not known yet.

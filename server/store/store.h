@@ -139,6 +139,9 @@ class Store {
   /// Never waits for the disk.
   [[nodiscard]] StoreState state() const;
   [[nodiscard]] RecordState record() const;
+  /// What the record of several servers is told from any other by; empty: it is a file, or not known yet. Waits for
+  /// nothing.
+  [[nodiscard]] std::string shared_identity() const;
   /// As works_as() said.
   [[nodiscard]] const std::string& server() const;
   /// Where it could not be written, or is not as it was left: whether it can be written now. Opens the file again where
@@ -204,7 +207,7 @@ class Store {
   /// Tells that this server still works on the job that it claimed.
   [[nodiscard]] Result<ClaimState> renew_claim(std::int64_t job);
   /// Has the server that works on the job end it. Refuses (kConflict) where none does.
-  [[nodiscard]] Status ask_to_cancel(std::int64_t job, const std::string& who);
+  [[nodiscard]] Status ask_to_cancel(std::int64_t job, const ChangeId& by);
   /// The jobs that wait and that no server works on that is believed to live, nor on another one of their cell.
   [[nodiscard]] Result<std::set<std::int64_t>> jobs_to_take() const;
   /// What was changed by changes that came after so many; see changes_made().
@@ -228,7 +231,7 @@ class Store {
   [[nodiscard]] Status set_job_running(std::int64_t id);
   [[nodiscard]] Status set_job_queued(std::int64_t id, bool attempt_counts = false);
   [[nodiscard]] Status set_job_failed(std::int64_t id, const std::string& message, const JobOutcome& outcome = {},
-                                      const std::string& who = {});
+                                      const ChangeId& by = {});
   /// For a job that makes no model.
   [[nodiscard]] Status set_job_done(std::int64_t id, const std::string& message, const JobOutcome& outcome = {});
 

@@ -303,8 +303,9 @@ JobRunner::End JobRunner::end(std::int64_t id, const Failed& failed, const StopR
   add_cost(progress.outcome, failed.cost);
   progress.what = cancelled ? progress.outcome.why : why;
   if (!cancelled && failed.again) progress.what += fmt::format("; tried {} times", job.attempts);
-  const Status ended = once_the_disk_lets(
-      id, {stop.service, {}}, [&] { return store_.set_job_failed(id, progress.what, progress.outcome, who); });
+  const Status ended = once_the_disk_lets(id, {stop.service, {}}, [&] {
+    return store_.set_job_failed(id, progress.what, progress.outcome, {"", "", who});
+  });
   if (ended) {
     book_.report(progress);
   } else if (ended.error().code != ErrorCode::kNotFound) {  // else its model is stored, or it is another server's

@@ -37,6 +37,8 @@ Status check_batch_id(const std::string& id) {
   return check_name(id, "batch");
 }
 
+std::int64_t the_job(const std::optional<std::int64_t>& job) { return *job; }
+
 Status check_most(const char* field, std::size_t asked, std::size_t most, const char* of_what) {
   if (asked <= most) return {};
   return failure(ErrorCode::kTooLarge, "{} {}, limit {}", asked, of_what, most).of(field).beyond(asked, most);
@@ -376,6 +378,7 @@ Result<std::int64_t> Trainer::check(const std::string& cell_name, const std::str
 Result<std::int64_t> Trainer::look_at(StoredJob job, const std::string& batch_id, const std::string& csv, bool apply,
                                       const ChangeId& id) {
   const std::string& cell_name = job.cell;
+  if (const auto before = queued_before(id); !before || *before) return before.map(the_job);
   const auto cell = find_cell(cells(), cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (!batch_id.empty() && !csv.empty()) {
@@ -398,9 +401,7 @@ Result<std::int64_t> Trainer::look_at(StoredJob job, const std::string& batch_id
     }
   }
   const MutexLock lock(submit_mutex_);
-  const auto before = queued_before(id);
-  if (!before) return tl::make_unexpected(before.error());
-  if (*before) return **before;
+  if (const auto before = queued_before(id); !before || *before) return before.map(the_job);  // meanwhile
   if (auto room = check_room(cell_name); !room) return tl::make_unexpected(room.error());
   const auto accepted = store_.add_diagnosis(job, {csv, apply, "", ""}, id);
   if (!accepted) return tl::make_unexpected(accepted.error());
@@ -424,6 +425,7 @@ Result<std::string> Trainer::batch_to_diagnose(const std::string& cell_name, con
 Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::vector<std::string>& batch_ids,
                                       const std::string& level, const std::string& bias, Quarantine quarantine,
                                       const ChangeId& id) {
+  if (const auto before = queued_before(id); !before || *before) return before.map(the_job);
   const auto cell = find_cell(cells(), cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (const Status known = check_spellings(**cell, level, bias); !known) return tl::make_unexpected(known.error());
@@ -451,9 +453,7 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
   if (const Status fit = check_together(*stored, job.batch_ids, release); !fit) return tl::make_unexpected(fit.error());
 
   const MutexLock lock(submit_mutex_);
-  const auto before = queued_before(id);
-  if (!before) return tl::make_unexpected(before.error());
-  if (*before) return **before;
+  if (const auto before = queued_before(id); !before || *before) return before.map(the_job);  // meanwhile
   if (auto room = check_room(cell_name); !room) return tl::make_unexpected(room.error());
   const auto accepted = store_.add_job(job, release, id);
   if (!accepted) return tl::make_unexpected(accepted.error());
@@ -479,28 +479,30 @@ Status Trainer::check_together(const std::vector<StoredBatch>& stored, const std
       .beyond(poses, options_.max_poses);
 }
 
-Status Trainer::cancel(std::int64_t id, const std::string& who) {
+Status Trainer::cancel(std::int64_t id, const ChangeId& by) {
+  const auto made = store_.outcome_of(by);
+  if (!made) return tl::make_unexpected(made.error());
+  if (*made) return {};
   const auto job = store_.job(id);
   if (!job) return tl::make_unexpected(job.error());
   const auto asked_for = was_asked_for(*job);
   if (!asked_for) return tl::make_unexpected(asked_for.error());
   const auto over = [id] { return failure(ErrorCode::kConflict, "job {} is over", id).of("job").with_value(id); };
   if (job->state == JobState::kDone || job->state == JobState::kFailed) return over();
-  if (store_.is_shared() && job->state == JobState::kRunning && runner_.claimed() != id) {
-    static_cast<void>(queue_.remove(id));
-    return store_.ask_to_cancel(id, who);
+  if (store_.is_shared() && job->state == JobState::kRunning) {
+    // Before it is told here: whoever takes the job up if this server dies now ends it, too.
+    if (const Status asked = store_.ask_to_cancel(id, by); !asked) return asked;
+    if (runner_.claimed() == id) static_cast<void>(queue_.cancel(id, by.who));
+    if (runner_.claimed() != id) static_cast<void>(queue_.remove(id));
+    return {};
   }
-  switch (queue_.cancel(id, who)) {
-    case JobQueue::Cancelled::kStopping:
-      return {};
-    case JobQueue::Cancelled::kUnknown:
-      return over();
-    case JobQueue::Cancelled::kRemoved:
-      break;
-  }
-  const JobOutcome outcome = cancelled_outcome(who);
-  if (auto ended = store_.set_job_failed(id, outcome.why, outcome, who); !ended) {
-    queue_.push_front({id, job->cell, *asked_for});  // as if it had not been asked
+  const JobQueue::Cancelled found = queue_.cancel(id, by.who);
+  if (found == JobQueue::Cancelled::kStopping) return {};
+  const bool waited_here = found == JobQueue::Cancelled::kRemoved;
+  if (!waited_here && !store_.is_shared()) return over();  // else it waits on another server
+  const JobOutcome outcome = cancelled_outcome(by.who);
+  if (auto ended = store_.set_job_failed(id, outcome.why, outcome, by); !ended) {
+    if (waited_here) queue_.push_front({id, job->cell, *asked_for});  // as if it had not been asked
     return ended;
   }
   JobProgress progress = progress_of(*job);

@@ -102,7 +102,7 @@ class Trainer {
   /// diagnosis already had. The batch that came with it stays, to be trained from when somebody asks. Returns once a
   /// waiting job is stored as ended; a running one ends within a second. Refuses an unknown job (kNotFound) and one
   /// that is over (kConflict).
-  [[nodiscard]] Status cancel(std::int64_t job, const std::string& who = {});
+  [[nodiscard]] Status cancel(std::int64_t job, const ChangeId& by = {});
   /// Lets trainings take a batch that was kept out because it did not fit the model in force.
   [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id, const ChangeId& id = {});
   /// Nothing takes the batch any more.

@@ -9,6 +9,7 @@
 
 #include "server/base/text_file.h"
 #include "tests/support/daemon.h"
+#include "tests/support/held_answer.h"
 #include "tests/support/postgres.h"
 #include "tests/support/virtual_cell.h"
 
@@ -76,7 +77,7 @@ class Fleet : public testing::Test {
   }
 
   test::Postgres database_;
-  const std::string url_ = database_.new_store();
+  std::string url_ = database_.new_store();  // as the servers reach it
   test::Daemon first_{0}, second_{1}, third_{2};
 };
 
@@ -135,6 +136,77 @@ TEST_F(Fleet, AHostThatWasStoppedWhileAnotherDidItsJobStoresNothingWhenItGoesOn)
   const auto models = session->models("cell-7");
   ASSERT_TRUE(models) << sentence(models.error());
   EXPECT_EQ(models->size(), 2U) << "one model of each job";
+}
+
+class FleetOfDyingServers : public Fleet {
+ protected:
+  /// Two servers that answer, and two versions: 1 in force, a rollback leads to 2, another one to 1.
+  void SetUp() override {
+    url_ = held_.url();
+    start(first_, "trains: false\n");
+    start(second_, "trains: false\n");
+    start(third_, "serves: false\n");
+    session_ = session_with({&first_, &second_}, seconds(60));
+    ASSERT_TRUE(end_of(*session_, submit(*session_, "b1", 1)).in_force);
+    ASSERT_EQ(end_of(*session_, submit(*session_, "b2", 2, 90)).model_version, 2);
+    EXPECT_EQ(third_.stop(), 0);
+    client::ChangeOptions forced;
+    forced.force = true;
+    for (const int version : {2, 1}) ASSERT_TRUE(session_->activate("cell-7", version, forced));
+  }
+  /// What the session is told of a change whose server is killed once the transaction with `statement` is committed,
+  /// before it hears of it. The server is started again.
+  template <typename Ask>
+  auto told_by_another(const std::string& statement, const Ask& ask) -> decltype(ask()) {
+    held_.hold(statement);
+    auto asked = std::async(std::launch::async, ask);
+    const pid_t maker = held_.held(kLimit);
+    EXPECT_TRUE(maker == first_.process().pid() || maker == second_.process().pid()) << maker;
+    test::Daemon& dead = maker == first_.process().pid() ? first_ : second_;
+    dead.kill();
+    auto told = asked.get();
+    EXPECT_TRUE(told) << sentence(told.error());
+    dead.start();
+    return told;
+  }
+  std::string counted(const std::string& rows) { return database_.sql(direct_, "SELECT count(*) FROM " + rows); }
+
+  const std::string direct_ = url_;
+  test::HeldAnswer held_{direct_};
+  std::unique_ptr<client::Session> session_;
+};
+
+TEST_F(FleetOfDyingServers, AChangeThatIsCommittedAndNotAnsweredIsToldByAnotherServerAndMadeOnce) {
+  const char* const change = "INSERT INTO changes";
+  EXPECT_EQ(told_by_another(change, [&] { return session_->rollback("cell-7"); }).value_or(0), 2);
+  EXPECT_EQ(counted("audit WHERE what = 'rollback'"), "1\n");
+  wait_until([&] { return served(*session_with({&first_})) == 2 && served(*session_with({&second_})) == 2; }, "served");
+
+  client::ChangeOptions forced;
+  forced.force = true;
+  const std::string before = counted("activations");
+  EXPECT_EQ(told_by_another(change, [&] { return session_->activate("cell-7", 1, forced); }).value_or(0), 1);
+  EXPECT_EQ(std::stoi(counted("activations")), std::stoi(before) + 1);
+
+  const auto job = told_by_another(change, [&] { return session_->train("cell-7", {"b1"}, "", ""); });
+  ASSERT_TRUE(job);
+  EXPECT_EQ(counted("jobs WHERE state = 'queued'"), "1\n");
+  EXPECT_EQ(counted(fmt::format("jobs WHERE id = {}", *job)), "1\n");
+
+  EXPECT_TRUE(told_by_another(change, [&] { return session_->cancel(*job); }));
+  EXPECT_EQ(counted("audit WHERE what = 'job' AND after = 'cancelled'"), "1\n");
+  EXPECT_EQ(end_of(*session_, *job).verdict, "cancelled");
+
+  EXPECT_TRUE(told_by_another(change, [&] { return session_->discard("cell-7", "b2"); }));
+  EXPECT_EQ(counted("audit WHERE what = 'discard'"), "1\n");
+
+  const auto taken = told_by_another("INSERT INTO batches", [&] {
+    return session_->submit_measurements("cell-7", "b3", test::virtual_batch_csv(60, 3));
+  });
+  ASSERT_TRUE(taken);
+  EXPECT_EQ(counted("batches WHERE id = 'b3'"), "1\n");
+  EXPECT_EQ(counted("job_batches WHERE batch = 'b3'"), "1\n");
+  EXPECT_EQ(counted(fmt::format("job_batches WHERE batch = 'b3' AND job = {}", *taken)), "1\n");
 }
 
 TEST_F(Fleet, WhenAServerIsKilledTheOtherAnswersAtOnceAndWithTheSameModel) {

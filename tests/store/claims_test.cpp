@@ -118,7 +118,7 @@ TEST_F(Claims, WhoLostAJobThatWasPutBackSinceStoresNothingOfIt) {
 TEST_F(Claims, AJobThatWasToEndEndsAlsoWhereItsServerIsGone) {
   const std::int64_t job = submit("cell-7", "b1");
   ASSERT_TRUE(one_->set_job_running(job));
-  ASSERT_TRUE(other_->ask_to_cancel(job, "anna"));
+  ASSERT_TRUE(other_->ask_to_cancel(job, {"", "", "anna"}));
   let_lease_pass(job);
   ASSERT_TRUE(other_->set_job_running(job));
   EXPECT_EQ(demand(other_->renew_claim(job)).cancelled_by, "anna");
@@ -134,11 +134,26 @@ TEST_F(Claims, AServerTakesUpItsOwnJobThatItLeftBehind) {
 
 TEST_F(Claims, WhoRunsAJobHearsThatAnotherServerWasAskedToEndIt) {
   const std::int64_t job = submit("cell-7", "b1");
-  EXPECT_EQ(other_->ask_to_cancel(job, "anna").error().code, ErrorCode::kConflict) << "nobody works on it";
+  EXPECT_EQ(other_->ask_to_cancel(job, {"", "", "anna"}).error().code, ErrorCode::kConflict) << "nobody works on it";
   ASSERT_TRUE(one_->set_job_running(job));
   EXPECT_FALSE(demand(one_->renew_claim(job)).cancelled_by);
-  ASSERT_TRUE(other_->ask_to_cancel(job, "anna"));
+  ASSERT_TRUE(other_->ask_to_cancel(job, {"", "", "anna"}));
   EXPECT_EQ(demand(one_->renew_claim(job)).cancelled_by, "anna");
+}
+
+TEST_F(Claims, AJobIsToEndOnceUnderOneIdWhicheverServerIsAsked) {
+  const std::int64_t waits = submit("cell-7", "b1"), runs = submit("cell-8", "b2");
+  const ChangeId of_waiting{"cancel-1", "cancel", "anna"}, of_running{"cancel-2", "cancel", "anna"};
+  ASSERT_TRUE(one_->set_job_failed(waits, "cancelled", {}, of_waiting));
+  const std::int64_t changes = demand(one_->changes_made());
+  EXPECT_TRUE(other_->set_job_failed(waits, "cancelled", {}, of_waiting)) << "it is over, by this very change";
+  EXPECT_EQ(demand(one_->changes_made()), changes);
+  EXPECT_EQ(other_->set_job_failed(waits, "cancelled", {}, {"cancel-3", "cancel", "anna"}).error().code,
+            ErrorCode::kNotFound);
+  ASSERT_TRUE(one_->set_job_running(runs));
+  ASSERT_TRUE(other_->ask_to_cancel(runs, of_running));
+  ASSERT_TRUE(one_->set_job_failed(runs, "cancelled"));
+  EXPECT_TRUE(one_->ask_to_cancel(runs, of_running)) << "nobody works on it any more, and it was asked";
 }
 
 TEST_F(Claims, AServerHearsOfAChangeOfAnotherAndWhichCellItWas) {
