@@ -51,7 +51,7 @@ Result<std::vector<std::string>> earlier_sessions(const Store& store, const Stor
       continue;
     const bool too_old =
         rule.kind == SessionRule::Kind::kDays && batch->accepted_at < newest - kSecondsPerDay * rule.count;
-    if (too_old) continue;  // copies from another server do not come in the order of their times
+    if (too_old) continue;  // servers of one record have clocks of their own
     const bool too_many =
         rule.kind == SessionRule::Kind::kLast && earlier.size() + own.size() >= static_cast<std::size_t>(rule.count);
     if (too_many || poses + batch->poses > max_poses) break;
