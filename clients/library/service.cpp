@@ -257,12 +257,21 @@ Result<std::vector<Job>> Session::jobs(const std::string& cell) const {
   return each<Job>(*jobs, [](const client::DatedJob& job) { return job_of(job.status); });
 }
 
-Result<int> Session::activate(const std::string& cell, int version, const std::string& reason,
-                              std::optional<int> expected_version, bool force) const {
+namespace {
+
+client::ChangeOptions decided_against(std::optional<int> expected_version, const std::string& reason) {
   client::ChangeOptions change;
   change.expected_version = expected_version;
-  change.force = force;
   change.reason = reason;
+  return change;
+}
+
+}  // namespace
+
+Result<int> Session::activate(const std::string& cell, int version, const std::string& reason,
+                              std::optional<int> expected_version, bool force) const {
+  client::ChangeOptions change = decided_against(expected_version, reason);
+  change.force = force;
   const auto now = inside_->session->activate(cell, version, change);
   if (!now) return passed_on(now);
   return *now;
@@ -276,12 +285,23 @@ Result<int> Session::import_model(const std::string& cell, const std::string& te
 
 Result<int> Session::roll_back(const std::string& cell, const std::string& reason,
                                std::optional<int> expected_version) const {
-  client::ChangeOptions change;
-  change.expected_version = expected_version;
-  change.reason = reason;
-  const auto now = inside_->session->rollback(cell, change);
+  const auto now = inside_->session->rollback(cell, decided_against(expected_version, reason));
   if (!now) return passed_on(now);
   return *now;
+}
+
+Status Session::release(const std::string& cell, const std::string& batch_id, const std::string& reason,
+                        std::optional<int> expected_version) const {
+  const auto done = inside_->session->release(cell, batch_id, decided_against(expected_version, reason));
+  if (!done) return passed_on(done);
+  return {};
+}
+
+Status Session::discard(const std::string& cell, const std::string& batch_id, const std::string& reason,
+                        std::optional<int> expected_version) const {
+  const auto done = inside_->session->discard(cell, batch_id, decided_against(expected_version, reason));
+  if (!done) return passed_on(done);
+  return {};
 }
 
 }  // namespace trammel::api

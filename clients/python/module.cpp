@@ -601,7 +601,21 @@ void add_session_changes(py::class_<Session>& session) {
              std::optional<int> expected_version) {
             return value_or_raise(unlocked([&] { return s.roll_back(cell, reason, expected_version); }));
           },
-          "cell"_a, "reason"_a, "expected_version"_a);
+          "cell"_a, "reason"_a, "expected_version"_a)
+      .def(
+          "release",
+          [](const Session& s, const std::string& cell, const std::string& batch_id, const std::string& reason,
+             std::optional<int> expected_version) {
+            value_or_raise(unlocked([&] { return s.release(cell, batch_id, reason, expected_version); }));
+          },
+          "cell"_a, "batch_id"_a, "reason"_a, "expected_version"_a)
+      .def(
+          "discard",
+          [](const Session& s, const std::string& cell, const std::string& batch_id, const std::string& reason,
+             std::optional<int> expected_version) {
+            value_or_raise(unlocked([&] { return s.discard(cell, batch_id, reason, expected_version); }));
+          },
+          "cell"_a, "batch_id"_a, "reason"_a, "expected_version"_a);
 }
 
 }  // namespace

@@ -45,7 +45,9 @@ void ReplyWriter::on_publication_matched(wire::dds::DataWriter*, const wire::dds
 }
 
 ReplyChannel::ReplyChannel(wire::dds::DomainParticipant& participant, const std::string& partition)
-    : participant_(participant), publisher_(participant.create_publisher(wire::publisher_qos(partition))) {}
+    : participant_(participant),
+      partition_(partition),
+      publisher_(participant.create_publisher(wire::publisher_qos(partition))) {}
 
 ReplyChannel::~ReplyChannel() {
   writers_.clear();
@@ -66,7 +68,10 @@ bool ReplyChannel::has_readers() const {
 }
 
 bool ReplyChannel::move_to(const std::string& partition) {
-  return publisher_->set_qos(wire::publisher_qos(partition)) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
+  if (publisher_->set_qos(wire::publisher_qos(partition)) != eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK)
+    return false;
+  partition_ = partition;
+  return true;
 }
 
 void ParkedChannels::park(Channel channel, Time now) {
@@ -77,6 +82,13 @@ void ParkedChannels::park(Channel channel, Time now) {
 }
 
 ParkedChannels::Channel ParkedChannels::take(const std::string& participant, const std::string& partition) {
+  const auto own = std::find_if(parked_.begin(), parked_.end(),
+                                [&](const Channel& one) { return one->partition() == partition; });
+  if (own != parked_.end()) {
+    Channel channel = std::move(*own);
+    parked_.erase(own);
+    return channel;
+  }
   if (parked_.empty() || !follows_to_another_partition(participant)) return nullptr;
   Channel channel = std::move(parked_.back());
   parked_.pop_back();

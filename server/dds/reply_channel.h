@@ -63,9 +63,11 @@ class ReplyChannel {
   [[nodiscard]] bool has_readers() const;
   /// With all its writers. False when DDS refuses.
   [[nodiscard]] bool move_to(const std::string& partition);
+  [[nodiscard]] const std::string& partition() const { return partition_; }
 
  private:
   wire::dds::DomainParticipant& participant_;
+  std::string partition_;
   wire::dds::Publisher* const publisher_;
   std::map<std::string, Writer> writers_;  // by topic
 };
@@ -75,7 +77,8 @@ class ReplyChannel {
 /// lease ends, and may meet the thread that sends old news to a newcomer: each then holds the lock that the other
 /// wants, for ever. So while clients come and go a channel moves to the next client, and the rest is deleted when
 /// nobody has left for a while. Other libraries than Fast DDS do not follow a writer to another partition: their
-/// clients get new channels. Not thread-safe.
+/// clients get new channels. Whoever comes again under its name gets its own one: its readers are matched with those
+/// writers as soon as it hears of them, and what another writer sends meanwhile they do not hear. Not thread-safe.
 class ParkedChannels {
  public:
   using Time = std::chrono::steady_clock::time_point;

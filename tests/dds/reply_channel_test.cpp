@@ -43,6 +43,21 @@ TEST_F(ParkedChannelsTest, AClientWhoseLibraryDoesNotFollowGetsANewOne) {
   EXPECT_EQ(parked_.size(), 1u);
 }
 
+TEST_F(ParkedChannelsTest, WhoeverComesAgainUnderItsNameGetsItsChannelAgain) {
+  const auto own = channel("own"), other = channel("other");
+  for (const std::string& library : {kCyclone, kFastDds}) {
+    parked_.park(own, now_);
+    parked_.park(other, now_);
+    EXPECT_EQ(parked_.take(library, "own"), own);
+    EXPECT_EQ(parked_.take(library, "other"), other);
+  }
+  parked_.park(own, now_);
+  EXPECT_EQ(parked_.take(kFastDds, "third"), own) << "nobody has come again for it";
+  parked_.park(own, now_);
+  EXPECT_EQ(parked_.take(kCyclone, "own"), nullptr) << "it has moved on";
+  EXPECT_EQ(parked_.take(kCyclone, "third"), own);
+}
+
 TEST_F(ParkedChannelsTest, WhatIsLeftOverIsDeletedOnceNobodyLeavesAnyMore) {
   for (int i = 0; i < 30; ++i) parked_.park(channel("client-" + std::to_string(i)), now_);
   EXPECT_FALSE(parked_.tend(now_ + wire::kLease)) << "clients come and go";

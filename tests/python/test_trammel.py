@@ -591,6 +591,22 @@ print("answered")
         self.assertEqual(self.session.models()[0]["version"], version)
         self.assertEqual(self.session.activate("cell-7", present), present)
 
+    def test_what_is_said_of_a_batch_holds_for_the_version_that_it_was_decided_against_only(self):
+        again = trammel.Batch.parse(trammel.simulate(self.cell, TRUTH, self.planned, seed=12).csv(), "again")
+        self.session.wait_for(self.session.submit("cell-7", again), limit_s=300)
+        present = next(one["version"] for one in self.session.models("cell-7") if one["in_force"])
+        for change in (self.session.discard, self.session.release):
+            with self.assertRaises(trammel.Conflict) as raised:
+                change("cell-7", "again", expected_version=present + 1)
+            self.assertIn(f"version {present}", raised.exception.message)
+        with self.assertRaises(trammel.TrammelError) as raised:
+            self.session.release("cell-7", "again", expected_version=present)
+        self.assertIn("quarantine", raised.exception.message)
+        self.session.discard("cell-7", "again", reason="measured twice", expected_version=present)
+        with self.assertRaises(trammel.Conflict) as raised:
+            self.session.release("cell-7", "again", expected_version=present)
+        self.assertIn("discarded", raised.exception.message)
+
     def test_a_batch_that_is_stored_is_learned_from_again(self):
         ended = self.session.wait_for(self.session.retrain("cell-7", level="M2"), limit_s=300)
         self.assertEqual(ended["stage"], "done", ended)

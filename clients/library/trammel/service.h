@@ -125,6 +125,13 @@ class TRAMMEL_API Session {
   /// Puts the version before in force again, and returns it; refused where `expected_version` is not in force.
   [[nodiscard]] Result<int> roll_back(const std::string& cell, const std::string& reason = {},
                                       std::optional<int> expected_version = {}) const;
+  /// Lets a batch out of quarantine, so that models may learn from it; refused where `expected_version` is not in
+  /// force.
+  [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id, const std::string& reason = {},
+                               std::optional<int> expected_version = {}) const;
+  /// Nothing learns from the batch any more; refused where `expected_version` is not in force.
+  [[nodiscard]] Status discard(const std::string& cell, const std::string& batch_id, const std::string& reason = {},
+                               std::optional<int> expected_version = {}) const;
 
  private:
   struct Inside;

@@ -566,3 +566,12 @@ class Session:
     def roll_back(self, cell: str, reason: str = "", expected_version: Optional[int] = None) -> int:
         """Puts the version before in force again, and returns it; `Conflict` where another than `expected_version` is."""
         return self._inside.roll_back(cell, reason, expected_version)
+
+    def release(self, cell: str, batch_id: str, reason: str = "", expected_version: Optional[int] = None) -> None:
+        """Lets a batch out of quarantine, so that models may learn from it; `Conflict` where another version than
+        `expected_version` is in force."""
+        self._inside.release(cell, batch_id, reason, expected_version)
+
+    def discard(self, cell: str, batch_id: str, reason: str = "", expected_version: Optional[int] = None) -> None:
+        """Nothing learns from the batch any more; `Conflict` where another version than `expected_version` is in force."""
+        self._inside.discard(cell, batch_id, reason, expected_version)

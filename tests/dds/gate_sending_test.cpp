@@ -1,0 +1,161 @@
+// To whom a gate sends what the library would send to everybody.
+#include <fastdds/rtps/network/SenderResource.h>
+#include <fastdds/rtps/transport/ChainingTransport.h>
+#include <fastdds/rtps/transport/TransportReceiverInterface.h>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <fastdds/rtps/common/LocatorList.hpp>
+#include <memory>
+#include <vector>
+
+#include "idl/askers.h"
+#include "idl/domain_gate.h"
+#include "idl/participant.h"
+#include "tests/support/rtps_packet.h"
+
+namespace trammel::wire {
+namespace {
+
+using std::chrono::milliseconds;
+using test::Packet;
+using test::PacketBytes;
+using test::ParameterList;
+using test::Prefix;
+namespace rtps = eprosima::fastdds::rtps;
+using eprosima::fastrtps::rtps::Locator_t;
+using eprosima::fastrtps::rtps::LocatorsIterator;
+using eprosima::fastrtps::rtps::SenderResource;
+
+constexpr Prefix kSelf = {1, 15, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}, kResident = {1, 15, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9},
+                 kNewcomer = {1, 15, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8};
+constexpr std::uint32_t kPublications = 0x000003c2, kSubscriptions = 0x000004c2, kTheirReader = 0x000003c7;
+constexpr std::uint16_t kOfResident = 2001, kOfNewcomer = 2002;  // UDP ports
+
+std::uint64_t socket_at(std::uint16_t port) { return std::uint64_t{port} << 32 | 0x7f000001u; }
+
+/// Counts the datagrams instead of sending them.
+class CountedSends final : public SenderResource {
+ public:
+  CountedSends() : SenderResource(LOCATOR_KIND_UDPv4) {
+    send_lambda_ = [this](const unsigned char*, std::uint32_t, LocatorsIterator* first,
+                          LocatorsIterator* last, const std::chrono::steady_clock::time_point&) {
+      for (; *first != *last; ++*first) ports_.push_back((**first).port);
+      return true;
+    };
+  }
+  [[nodiscard]] int to(std::uint16_t port) const {
+    return static_cast<int>(std::count(ports_.begin(), ports_.end(), std::uint32_t{port}));
+  }
+
+ private:
+  std::vector<std::uint32_t> ports_;
+};
+
+class Unheard final : public rtps::TransportReceiverInterface {
+ public:
+  void OnDataReceived(const unsigned char*, const std::uint32_t, const Locator_t&,
+                      const Locator_t&) override {}
+};
+
+PacketBytes announcement(const Prefix& of, std::uint16_t port) {
+  PacketBytes lease;
+  test::put32(lease, 10);
+  test::put32(lease, 0);
+  const ParameterList list =
+      ParameterList().guid(0x0050, of, 0x000001c1).locator(0x0032, port).locator(0x0031, port).add(0x0002, lease);
+  return Packet(of).data({0, 0x000100c2, 1, {}, list.payload()}).bytes();
+}
+
+class GateSending : public testing::Test {
+ protected:
+  GateSending()
+      : gate_(dynamic_cast<rtps::ChainingTransport*>(
+            with_domain_gate(std::make_shared<rtps::UDPv4TransportDescriptor>(), {})
+                ->create_transport())) {
+    hear(announcement(kResident, kOfResident));
+    hear(announcement(kNewcomer, kOfNewcomer));
+  }
+  void hear(const PacketBytes& message) {
+    gate_->receive(&nobody_, message.data(), static_cast<std::uint32_t>(message.size()), locator("127.0.0.1", 2000),
+                   locator("127.0.0.1", 3000));
+  }
+  /// To both of them.
+  void send(const PacketBytes& message) {
+    rtps::LocatorList to;
+    for (const std::uint16_t port : {kOfResident, kOfNewcomer}) to.push_back(locator("127.0.0.1", port));
+    rtps::Locators first(to.begin()), last(to.end());
+    gate_->send(&sends_, message.data(), static_cast<std::uint32_t>(message.size()), &first, &last, {});
+  }
+  static PacketBytes offer(std::uint32_t count) {
+    return Packet(kSelf).heartbeat(kTheirReader, kPublications, 1, 900, count).bytes();
+  }
+
+  std::unique_ptr<rtps::ChainingTransport> gate_;
+  Unheard nobody_;
+  CountedSends sends_;
+};
+
+TEST_F(GateSending, ANewcomerHearsEveryHeartbeatOfDiscoveryOfWhichTheOthersAreSparedMost) {
+  constexpr int kOffers = 200;
+  for (std::uint32_t i = 1; i <= kOffers; ++i) {
+    hear(Packet(kNewcomer).to(kSelf).acknack(kTheirReader, kPublications, i, 1, i).bytes());
+    send(offer(i));
+  }
+  EXPECT_EQ(sends_.to(kOfNewcomer), kOffers) << "it asks for the next numbers at each";
+  EXPECT_LT(sends_.to(kOfResident), kOffers);
+}
+
+TEST_F(GateSending, WhoHasConfirmedEverythingIsNoNewcomer) {
+  constexpr int kOffers = 200;
+  for (std::uint32_t i = 1; i <= kOffers; ++i) {
+    hear(Packet(kNewcomer).to(kSelf).acknack(kTheirReader, kPublications, 901, 0, i).bytes());
+    send(offer(i));
+  }
+  EXPECT_LT(sends_.to(kOfNewcomer), kOffers);
+  EXPECT_EQ(sends_.to(kOfResident), sends_.to(kOfNewcomer));
+}
+
+TEST(Askers, WhoAsksForEndpointsIsKnownByTheNumbersThatItLacks) {
+  const auto asks = [](std::uint32_t writer, std::uint32_t bits) {
+    return asks_for_endpoints(Packet(kNewcomer).to(kSelf).acknack(kTheirReader, writer, 3, bits, 1).bytes());
+  };
+  EXPECT_TRUE(asks(kPublications, 1));
+  EXPECT_TRUE(asks(kSubscriptions, 256));
+  EXPECT_FALSE(asks(kPublications, 0)) << "it confirms";
+  EXPECT_FALSE(asks(0x00000103, 1)) << "of a writer of ours";
+  EXPECT_FALSE(asks_for_endpoints({}));
+}
+
+TEST(Askers, WhoAskedIsToldMoreForASecondAndOthersAreNot) {
+  const Askers::Time start = std::chrono::hours(1);
+  Askers askers;
+  askers.asks(kNewcomer, start);
+  EXPECT_TRUE(askers.sockets(start).empty()) << "nobody knows where it listens";
+  askers.announced(kNewcomer, {socket_at(kOfNewcomer)}, start);
+  askers.announced(kResident, {socket_at(kOfResident)}, start);
+  EXPECT_TRUE(askers.sockets(start).empty());
+  askers.asks(kNewcomer, start);
+  askers.announced(kNewcomer, {socket_at(kOfNewcomer)}, start + milliseconds(200));
+  EXPECT_EQ(askers.sockets(start + milliseconds(999)), std::vector<std::uint64_t>{socket_at(kOfNewcomer)});
+  EXPECT_TRUE(askers.sockets(start + Askers::kAsks).empty());
+}
+
+TEST(Askers, AThousandThatOnlyAnnounceThemselvesTakeNoNewcomersPlace) {
+  const Askers::Time start = std::chrono::hours(1);
+  Askers askers;
+  askers.announced(kNewcomer, {socket_at(kOfNewcomer)}, start);
+  askers.asks(kNewcomer, start);
+  for (unsigned i = 0; i < 2 * Askers::kMost; ++i) {
+    Prefix invented = kResident;
+    invented[10] = static_cast<unsigned char>(i / 256);
+    invented[11] = static_cast<unsigned char>(i % 256);
+    askers.announced(invented, {socket_at(kOfResident)}, start);
+  }
+  EXPECT_EQ(askers.sockets(start), std::vector<std::uint64_t>{socket_at(kOfNewcomer)});
+}
+
+}  // namespace
+}  // namespace trammel::wire
