@@ -1,0 +1,129 @@
+// What a session reads of servers: batches, jobs, models, what was found.
+#include <algorithm>
+#include <functional>
+
+#include "clients/session/participant.h"
+
+namespace trammel::client {
+namespace {
+
+/// Adds what no other server has told already: several have one record.
+template <typename Item, typename IsSame>
+void add_new(std::vector<std::pair<Item, std::string>>& all, const std::vector<Item>& told, const std::string& server,
+             const IsSame& is_same) {
+  const auto before = static_cast<std::ptrdiff_t>(all.size());  // a server tells each once
+  for (const Item& item : told) {
+    const auto known = [&](const auto& other) { return is_same(other.first, item); };
+    if (std::none_of(all.begin(), all.begin() + before, known)) all.emplace_back(item, server);
+  }
+}
+
+std::vector<BatchOfService> batches_in(const std::vector<wire::ReadModelsReply>& replies) {
+  std::vector<std::pair<wire::BatchInfo, std::string>> told;
+  for (const wire::ReadModelsReply& reply : replies)
+    add_new(told, reply.batches(), reply.header().server().to_string(), std::equal_to<>());
+  std::vector<BatchOfService> batches;
+  for (const auto& [batch, server] : told) {
+    batches.push_back(from_wire(batch));
+    batches.back().server = server;
+  }
+  return batches;
+}
+
+}  // namespace
+
+Result<DiagnosisAnswer> Session::diagnosis(const std::string& cell, std::int64_t job, bool page) {
+  const auto found = participant_->find_job(job, cell);
+  if (!found) return tl::make_unexpected(found.error());
+  wire::ReadModelsRequest request;
+  request.job(job);
+  request.page(page);
+  auto reply = participant_->read(cell, found->first, wire::READ_FINDINGS, std::move(request),
+                                  participant_->record_of(found->first));
+  if (!reply) return tl::make_unexpected(reply.error());
+  return DiagnosisAnswer{std::move(reply->text()), std::move(reply->page_html()), from_wire(reply->in_force())};
+}
+
+Result<std::vector<BatchOfService>> Session::quarantine(const std::string& cell) {
+  return participant_->read_all(cell, wire::READ_QUARANTINE).map(batches_in);
+}
+
+Result<std::vector<BatchOfService>> Session::batches(const std::string& cell) {
+  return participant_->read_all(cell, wire::READ_BATCHES).map(batches_in);
+}
+
+Result<std::string> Session::export_batch(const std::string& cell, const std::string& batch_id) {
+  wire::ReadModelsRequest request;
+  request.batch_id(batch_id);
+  auto reply = participant_->read(cell, {}, wire::READ_BATCH, request);
+  if (!reply) return tl::make_unexpected(reply.error());
+  return std::move(reply->text());
+}
+
+Result<std::vector<DatedJob>> Session::jobs(const std::string& cell) {
+  const auto replies = participant_->read_all(cell, wire::READ_JOBS);
+  if (!replies) return tl::make_unexpected(replies.error());
+  std::vector<std::pair<wire::Job, std::string>> told;
+  for (const wire::ReadModelsReply& reply : *replies)
+    add_new(told, reply.jobs(), reply.header().server().to_string(), is_same);
+  std::vector<DatedJob> jobs;
+  for (const auto& [job, server] : told) jobs.push_back(from_wire(job, server));
+  return jobs;
+}
+
+Result<std::vector<AuditText>> Session::audit(const std::string& cell, std::int64_t since_unix_s, std::size_t most) {
+  wire::ReadModelsRequest request;
+  request.since_unix_s(since_unix_s);
+  request.most(static_cast<std::uint32_t>(most));
+  const auto replies = participant_->read_all(cell, wire::READ_AUDIT, request);
+  if (!replies) return tl::make_unexpected(replies.error());
+  std::vector<AuditText> texts;
+  for (const wire::ReadModelsReply& reply : *replies)
+    texts.push_back({reply.header().server().to_string(), reply.text()});
+  return texts;
+}
+
+Result<std::vector<std::string>> Session::fleet() {
+  const auto replies = participant_->read_all("", wire::READ_FLEET);
+  if (!replies) return tl::make_unexpected(replies.error());
+  std::vector<std::string> texts;
+  for (const wire::ReadModelsReply& reply : *replies) texts.push_back(reply.text());
+  return texts;
+}
+
+Result<std::vector<std::string>> Session::health(const std::string& cell, std::size_t most) {
+  wire::ReadModelsRequest request;
+  request.since_unix_s(-1);
+  request.most(static_cast<std::uint32_t>(most));
+  const auto replies = participant_->read_all(cell, wire::READ_HEALTH, request);
+  if (!replies) return tl::make_unexpected(replies.error());
+  std::vector<std::string> texts;
+  for (const wire::ReadModelsReply& reply : *replies) texts.push_back(reply.text());
+  return texts;
+}
+
+Result<std::vector<ModelInfo>> Session::models(const std::string& cell) {
+  const auto reply = participant_->read(cell, {}, wire::READ_MODELS);
+  if (!reply) return tl::make_unexpected(reply.error());
+  std::vector<ModelInfo> models;
+  for (const wire::ModelInfo& model : reply->models()) models.push_back(from_wire(model));
+  return models;
+}
+
+Result<std::string> Session::export_model(const std::string& cell, int version) {
+  wire::ReadModelsRequest request;
+  request.version(version);
+  auto reply = participant_->read(cell, {}, wire::READ_MODEL, std::move(request));
+  if (!reply) return tl::make_unexpected(reply.error());
+  return std::move(reply->text());
+}
+
+Result<std::string> Session::replay(const std::string& cell, int version) {
+  wire::ReadModelsRequest request;
+  request.version(version);
+  auto reply = participant_->read(cell, {}, wire::READ_REPLAY, std::move(request));
+  if (!reply) return tl::make_unexpected(reply.error());
+  return std::move(reply->text());
+}
+
+}  // namespace trammel::client
