@@ -40,8 +40,8 @@ std::uint64_t socket_at(std::uint16_t port) { return std::uint64_t{port} << 32 |
 class CountedSends final : public SenderResource {
  public:
   CountedSends() : SenderResource(LOCATOR_KIND_UDPv4) {
-    send_lambda_ = [this](const unsigned char*, std::uint32_t, LocatorsIterator* first,
-                          LocatorsIterator* last, const std::chrono::steady_clock::time_point&) {
+    send_lambda_ = [this](const unsigned char*, std::uint32_t, LocatorsIterator* first, LocatorsIterator* last,
+                          const std::chrono::steady_clock::time_point&) {
       for (; *first != *last; ++*first) ports_.push_back((**first).port);
       return true;
     };
@@ -56,8 +56,7 @@ class CountedSends final : public SenderResource {
 
 class Unheard final : public rtps::TransportReceiverInterface {
  public:
-  void OnDataReceived(const unsigned char*, const std::uint32_t, const Locator_t&,
-                      const Locator_t&) override {}
+  void OnDataReceived(const unsigned char*, const std::uint32_t, const Locator_t&, const Locator_t&) override {}
 };
 
 PacketBytes announcement(const Prefix& of, std::uint16_t port) {
@@ -73,8 +72,7 @@ class GateSending : public testing::Test {
  protected:
   GateSending()
       : gate_(dynamic_cast<rtps::ChainingTransport*>(
-            with_domain_gate(std::make_shared<rtps::UDPv4TransportDescriptor>(), {})
-                ->create_transport())) {
+            with_domain_gate(std::make_shared<rtps::UDPv4TransportDescriptor>(), {})->create_transport())) {
     hear(announcement(kResident, kOfResident));
     hear(announcement(kNewcomer, kOfNewcomer));
   }

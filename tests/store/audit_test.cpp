@@ -6,32 +6,21 @@
 #include <algorithm>
 #include <fstream>
 
-#include "server/base/hash.h"
 #include "server/store/audit_json.h"
-#include "server/store/store.h"
-#include "tests/support/demand.h"
-#include "tests/support/small_cell.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/store/store_under_test.h"
 
 namespace trammel {
 namespace {
 
 using test::demand;
 
-class AuditTest : public testing::Test {
+class AuditTest : public testing::Test, protected test::StoreUnderTest {
  protected:
-  StoredJob job(const std::string& batch) {
-    StoredJob job;
-    job.cell = "cell-7";
-    job.batch_ids = {batch};
-    return job;
-  }
-  /// The job that came with it.
+  void SetUp() override { open(); }
   std::int64_t submit(const std::string& id) {
-    const std::string csv = "q1_deg\n" + id + "\n";
-    StoredBatch batch{"cell-7", id, csv, sha256_hex(csv), "client:" + id, 1700000000, 1};
+    StoredBatch batch = test::batch_of(id);
     batch.who = "robot-3";
-    return demand(store_->add_batch(batch, job(id))).id;
+    return StoreUnderTest::submit(batch);
   }
   int train(const std::string& id, bool put_in_force) {
     return demand(
@@ -48,10 +37,6 @@ class AuditTest : public testing::Test {
     SQLite::Database(path_, SQLite::OPEN_READWRITE).exec(sql);
   }
 
-  test::TemporaryFolder folder_;
-  const std::string path_ = folder_.file("trammel.db");
-  const std::shared_ptr<const Cell> cell_ = test::small_cell("cell-7");
-  std::unique_ptr<Store> store_ = demand(Store::open(path_));
   int trained_ = 0;
 };
 
@@ -147,16 +132,17 @@ TEST_F(AuditTest, WhereAnotherVersionIsInForceThanExpectedNothingChangesAndNothi
   const auto before = demand(store_->audit()).rows.size();
   ChangeId id{"c:1", "train", "anna"};
   id.expected_version = 3;
-  const auto refused = store_->add_job(job("lt-07"), false, id);
+  const auto refused = store_->add_job(test::job_of("lt-07"), false, id);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kConflict);
   EXPECT_NE(refused.error().message.find("service put it in force"), std::string::npos) << refused.error().message;
   EXPECT_EQ(store_->set_quarantine("cell-7", "lt-07", "strange", id).error().code, ErrorCode::kConflict);
   EXPECT_EQ(demand(store_->audit()).rows.size(), before);
   id.expected_version = 1;
-  const auto queued = demand(store_->add_job(job("lt-07"), false, id));
+  const auto queued = demand(store_->add_job(test::job_of("lt-07"), false, id));
   train("lt-08", true);
-  EXPECT_EQ(demand(store_->add_job(job("lt-07"), false, id)).id, queued.id) << "the repeat of what was done is none";
+  EXPECT_EQ(demand(store_->add_job(test::job_of("lt-07"), false, id)).id, queued.id)
+      << "the repeat of what was done is none";
 }
 
 TEST_F(AuditTest, WhatIsDiscardedIsTakenByNothingAnyMore) {
@@ -165,7 +151,7 @@ TEST_F(AuditTest, WhatIsDiscardedIsTakenByNothingAnyMore) {
   ASSERT_TRUE(store_->discard("cell-7", "lt-07", id));
   ASSERT_TRUE(store_->discard("cell-7", "lt-07", id));
   EXPECT_EQ(store_->set_quarantine("cell-7", "lt-07", "").error().code, ErrorCode::kConflict);
-  EXPECT_EQ(store_->add_job(job("lt-07"), true).error().code, ErrorCode::kConflict);
+  EXPECT_EQ(store_->add_job(test::job_of("lt-07"), true).error().code, ErrorCode::kConflict);
   const AuditTrail trail = demand(store_->audit());
   ASSERT_EQ(trail.rows.size(), 3u);
   EXPECT_EQ(told(trail).back(), "discard batch lt-07: free -> discarded: the tracker was warm by anna");

@@ -8,12 +8,8 @@
 #include <fstream>
 #include <thread>
 
-#include "server/base/hash.h"
 #include "server/compensate/model_file.h"
-#include "server/store/store.h"
-#include "tests/support/demand.h"
-#include "tests/support/small_cell.h"
-#include "tests/support/temporary_folder.h"
+#include "tests/store/store_under_test.h"
 
 namespace trammel {
 namespace {
@@ -39,24 +35,18 @@ std::string content_of(const std::string& path) {
   return content;
 }
 
-class BackupTest : public testing::Test {
+class BackupTest : public testing::Test, protected test::StoreUnderTest {
  protected:
+  void SetUp() override { open(); }
   std::int64_t submit(const std::string& id) {
-    StoredJob job;
-    job.cell = "cell-7";
-    job.batch_ids = {id};
-    const std::string csv = "q1_deg\n" + id + "\n" + std::string(20000, '#');
-    return demand(store_->add_batch({"cell-7", id, csv, sha256_hex(csv), "client:" + id, 1700000000, 1}, job)).id;
+    return StoreUnderTest::submit(test::batch_of(id, "q1_deg\n" + id + "\n" + std::string(20000, '#'), "client:" + id));
   }
   void train(const std::string& id) {
     ASSERT_TRUE(store_->add_model("cell-7", test::nominal_model(cell_, ++trained_), submit(id), true, "judged"));
   }
   Result<StoreCopy> back_up() { return back_up_store(path_, copy_); }
 
-  test::TemporaryFolder folder_;
-  const std::string path_ = folder_.file("trammel.db"), copy_ = folder_.file("copy.db");
-  const std::shared_ptr<const Cell> cell_ = test::small_cell("cell-7");
-  std::unique_ptr<Store> store_ = demand(Store::open(path_));
+  const std::string copy_ = folder_.file("copy.db");
   int trained_ = 0;
 };
 
@@ -74,10 +64,7 @@ TEST_F(BackupTest, ACopyOfAStoreThatIsServedHoldsEveryRowOfIt) {
 
 TEST_F(BackupTest, ACopyOfAStoreInWhichABatchWasReleasedIsWhole) {
   train("lt-07");
-  StoredJob job;
-  job.cell = "cell-7";
-  job.batch_ids = {"lt-07"};
-  ASSERT_TRUE(store_->add_job(job, true));
+  ASSERT_TRUE(store_->add_job(test::job_of("lt-07"), true));
   const auto copy = back_up();
   EXPECT_TRUE(copy) << copy.error().message;
 }
@@ -94,7 +81,7 @@ TEST_F(BackupTest, AReleaseInAStoreOfBeforeIsKeptAndItsCopyIsWhole) {
         "PRIMARY KEY (job, batch), FOREIGN KEY (cell, batch) REFERENCES batches (cell, id)) WITHOUT ROWID");
     file.exec("INSERT INTO job_releases VALUES (" + std::to_string(job) + ", 'cell-7', 'lt-07')");
   }
-  store_ = demand(Store::open(path_));
+  open();
   EXPECT_TRUE(demand(store_->may_release(job)));
   const auto copy = back_up();
   EXPECT_TRUE(copy) << copy.error().message;
@@ -110,7 +97,7 @@ TEST_F(BackupTest, AStoreThatIsPutBackServesWhatItServedBitForBit) {
   fs::remove_all(path_ + ".models");
   for (const char* more : {"", "-wal", "-shm"}) fs::remove(path_ + more);
   fs::rename(copy_, path_);
-  store_ = demand(Store::open(path_));
+  open();
   EXPECT_FALSE(store_->state().why_not_written);
   EXPECT_EQ(demand(store_->version_in_force("cell-7")), 2);
   EXPECT_EQ(serialize(demand(store_->model("cell-7", 2))), before);

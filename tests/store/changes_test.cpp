@@ -1,11 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "server/base/hash.h"
-#include "server/store/store.h"
-#include "tests/support/demand.h"
+#include "tests/store/store_under_test.h"
 #include "tests/support/postgres.h"
-#include "tests/support/small_cell.h"
-#include "tests/support/temporary_folder.h"
 
 namespace trammel {
 namespace {
@@ -13,31 +9,17 @@ namespace {
 using test::demand;
 
 /// On each kind of database.
-class ChangesTest : public testing::TestWithParam<std::string> {
+class ChangesTest : public testing::TestWithParam<std::string>, protected test::StoreUnderTest {
  protected:
+  ChangesTest() : StoreUnderTest(GetParam() == "file" ? "" : test::Postgres::of_program().new_store()) {}
   static void SetUpTestSuite() { test::Postgres::of_program(); }
   void SetUp() override {
-    for (int version = 1; version <= 3; ++version)
-      ASSERT_TRUE(store_->add_model("cell-7", test::nominal_model(cell_, version), 0, true, ""));
+    open();
+    for (int version = 1; version <= 3; ++version) add_model(version, true);
   }
-  void restart() {
-    store_.reset();
-    store_ = demand(Store::open(path_));
-  }
-  int in_force() { return demand(store_->version_in_force("cell-7")).value_or(0); }
-  StoredJob job() {
-    StoredJob job;
-    job.cell = "cell-7";
-    job.batch_ids = {"lt-07"};
-    return job;
-  }
+  static StoredJob job() { return test::job_of("lt-07"); }
 
   const ChangeId id_{"robot-3:17", "what is asked for"};
-  test::TemporaryFolder folder_;
-  const std::string path_ =
-      GetParam() == "file" ? folder_.file("trammel.db") : test::Postgres::of_program().new_store();
-  const std::shared_ptr<const Cell> cell_ = test::small_cell("cell-7");
-  std::unique_ptr<Store> store_ = demand(Store::open(path_));
 };
 
 INSTANTIATE_TEST_SUITE_P(, ChangesTest, testing::Values("file", "postgresql"),
@@ -59,10 +41,9 @@ TEST_P(ChangesTest, ARepeatSaysWhatCameOfTheFirstThoughOthersChangedThingsSince)
 }
 
 TEST_P(ChangesTest, ATrainingOrADiagnosisThatIsAskedForAgainIsQueuedOnce) {
-  const std::string csv = "q1_deg\n1\n";
-  const auto brought = demand(store_->add_batch({"cell-7", "lt-07", csv, sha256_hex(csv), "client:1", 1, 1}, job()));
+  const std::int64_t brought = submit(test::batch_of("lt-07"));
   const auto first = demand(store_->add_job(job(), false, id_));
-  EXPECT_NE(first.id, brought.id);
+  EXPECT_NE(first.id, brought);
   EXPECT_EQ(demand(store_->add_job(job(), false, id_)).id, first.id);
   const ChangeId other{"robot-3:18", "diagnose"};
   const auto diagnosis = demand(store_->add_diagnosis(job(), {}, other));

@@ -7,12 +7,8 @@
 #include <thread>
 #include <vector>
 
-#include "server/base/hash.h"
-#include "server/store/store.h"
-#include "tests/support/demand.h"
+#include "tests/store/store_under_test.h"
 #include "tests/support/postgres.h"
-#include "tests/support/small_cell.h"
-#include "tests/support/temporary_folder.h"
 
 namespace trammel {
 namespace {
@@ -29,11 +25,10 @@ class Claims : public testing::Test {
     return store;
   }
   std::int64_t submit(const std::string& cell, const std::string& id) {
-    const std::string csv = "q1_deg\n" + id + "\n";
-    StoredJob job;
-    job.cell = cell;
-    job.batch_ids = {id};
-    return demand(one_->add_batch({cell, id, csv, sha256_hex(csv), "client:1", 1700000000, 12}, job)).id;
+    StoredBatch batch = test::batch_of(id);
+    StoredJob job = test::job_of(id);
+    batch.cell = job.cell = cell;
+    return demand(one_->add_batch(batch, job)).id;
   }
   /// As if the server had not been heard of for longer than its lease.
   void let_lease_pass(std::int64_t job) {

@@ -13,42 +13,28 @@
 #include <optional>
 #include <set>
 
-#include "server/base/hash.h"
 #include "server/compensate/model_file.h"
-#include "server/store/store.h"
 #include "server/store/writer_lock.h"
-#include "tests/support/demand.h"
+#include "tests/store/store_under_test.h"
 #include "tests/support/faulty_disk.h"
-#include "tests/support/small_cell.h"
-#include "tests/support/temporary_folder.h"
 
 namespace trammel {
 namespace {
 
 namespace fs = std::filesystem;
 using test::demand;
+using test::job_of;
 
 constexpr std::streamoff kPage = 4096;
 
+/// Of a page and more.
 StoredBatch batch(const std::string& id) {
-  const std::string csv = "q1_deg\n" + id + std::string(3000, '0') + "\n";
-  return {"cell-7", id, csv, sha256_hex(csv), "client:" + id, 1700000000, 1};
+  return test::batch_of(id, "q1_deg\n" + id + std::string(3000, '0') + "\n", "client:" + id);
 }
 
-StoredJob job_of(const std::string& id) {
-  StoredJob job;
-  job.cell = "cell-7";
-  job.batch_ids = {id};
-  return job;
-}
-
-class StoreFaults : public testing::Test {
+class StoreFaults : public testing::Test, protected test::StoreUnderTest {
  protected:
-  void open() { store_ = demand(Store::open(path_)); }
-  void restart() {
-    store_.reset();
-    open();
-  }
+  ~StoreFaults() override { store_.reset(); }  // while the disk is there
   void put_in_force(int poses, const std::string& cell = "cell-7") {
     const auto& its = cell == "cell-7" ? cell_ : other_cell_;
     ASSERT_TRUE(store_->add_model(cell, test::nominal_model(its, poses), 0, true, "made"));
@@ -67,12 +53,8 @@ class StoreFaults : public testing::Test {
   }
   void forget_copies() { fs::remove_all(path_ + ".models"); }
 
-  test::TemporaryFolder folder_;
-  const std::string path_ = folder_.file("trammel.db");
-  const std::shared_ptr<const Cell> cell_ = test::small_cell("cell-7");
   const std::shared_ptr<const Cell> other_cell_ = test::small_cell("cell-8");
   std::optional<test::FaultyDisk> disk_;
-  std::unique_ptr<Store> store_;
 };
 
 TEST_F(StoreFaults, OnADiskThatIsFullAtTheStartTheModelsAreThereAndChangesAreRefusedUntilThereIsRoom) {

@@ -7,33 +7,19 @@
 #include <set>
 #include <thread>
 
-#include "server/base/hash.h"
-#include "server/store/store.h"
 #include "server/store/store_check.h"
 #include "server/store/store_init.h"
 #include "server/store/store_place.h"
-#include "tests/support/demand.h"
+#include "tests/store/store_under_test.h"
 #include "tests/support/postgres.h"
 #include "tests/support/refusal.h"
-#include "tests/support/small_cell.h"
-#include "tests/support/temporary_folder.h"
 
 namespace trammel {
 namespace {
 
+using test::batch_of;
 using test::demand;
-
-StoredBatch batch(const std::string& id) {
-  const std::string csv = "q1_deg\n" + id + "\n";
-  return {"cell-7", id, csv, sha256_hex(csv), "client:" + id, 1700000000, 1};
-}
-
-StoredJob job_of(const std::string& id) {
-  StoredJob job;
-  job.cell = "cell-7";
-  job.batch_ids = {id};
-  return job;
-}
+using test::job_of;
 
 class SharedStore : public testing::Test {
  protected:
@@ -74,7 +60,7 @@ TEST_F(SharedStore, FourProcessesThatWriteAtATimeLoseNothingAndGiveNoNumberTwice
     const auto store = open(fmt::format("cache-{}", process));
     for (int i = 0; i < kEach; ++i) {
       const std::string id = fmt::format("{}-{}", process, i);
-      const auto job = store->add_batch(batch(id), job_of(id));
+      const auto job = store->add_batch(batch_of(id), job_of(id));
       if (!job) return false;
       const auto model = test::nominal_model(cell_, 1 + process * kEach + i);
       const auto version = store->add_model("cell-7", model, job->id, true, "made", false, {id, "made"});
@@ -108,7 +94,7 @@ TEST_F(SharedStore, FourProcessesThatWriteAtATimeLoseNothingAndGiveNoNumberTwice
 }
 
 TEST_F(SharedStore, OneBatchThatFourProcessesSubmitAtATimeIsOneJob) {
-  EXPECT_EQ(at_once(4, [&](int) { return open()->add_batch(batch("lt-07"), job_of("lt-07")).has_value(); }), 4);
+  EXPECT_EQ(at_once(4, [&](int) { return open()->add_batch(batch_of("lt-07"), job_of("lt-07")).has_value(); }), 4);
   EXPECT_EQ(demand(open()->unfinished_jobs()).size(), 1u);
 }
 
@@ -141,7 +127,7 @@ TEST_F(SharedStore, AConnectionThatIsCutIsMadeAnewAndNobodyNotices) {
   put_in_force(*store, 1);
   say("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = 'trammel' AND datname = "
       "current_database()");
-  EXPECT_TRUE(store->add_batch(batch("lt-07"), job_of("lt-07")));
+  EXPECT_TRUE(store->add_batch(batch_of("lt-07"), job_of("lt-07")));
   EXPECT_FALSE(store->state().why_not_written);
 }
 
@@ -199,7 +185,7 @@ TEST_F(SharedStore, ARoleThatMayOnlyUseItCannotChangeTheAuditTrail) {
   ASSERT_TRUE(init_store(url_, "service"));
   EXPECT_EQ(init_store(url_, "postgres").error().code, ErrorCode::kRefused) << "it owns the store";
   const auto store = demand(Store::open(service));
-  ASSERT_TRUE(store->add_batch(batch("lt-07"), job_of("lt-07")));
+  ASSERT_TRUE(store->add_batch(batch_of("lt-07"), job_of("lt-07")));
   put_in_force(*store, 1);
   EXPECT_FALSE(demand(store->audit()).broken);
   const auto may = [&](const char* right) {
@@ -224,7 +210,7 @@ TEST_F(SharedStore, NoErrorHoldsThePasswordOrAValue) {
   const auto unread = Store::open("postgresql://u:s3%zzcret@h/d");
   ASSERT_FALSE(unread);
   EXPECT_EQ(sentence(unread.error()).find("s3"), std::string::npos) << sentence(unread.error());
-  StoredBatch odd = batch("lt-07");
+  StoredBatch odd = batch_of("lt-07");
   odd.request_id = "s3cret\xFF";
   const auto refused = open()->add_batch(odd, job_of("lt-07"));
   ASSERT_FALSE(refused);
@@ -239,7 +225,7 @@ TEST_F(SharedStore, RowsThatSomebodyHoldsLockedAreBusyAndItIsSaidWho) {
                           "LOCK TABLE audit_end IN EXCLUSIVE MODE", "-c", "SELECT 'locked'", "-c",
                           "SELECT pg_sleep(60)"});
   ASSERT_TRUE(somebody.wait_for_line("locked", std::chrono::seconds(20)));
-  const auto refused = store->add_batch(batch("lt-07"), job_of("lt-07"));
+  const auto refused = store->add_batch(batch_of("lt-07"), job_of("lt-07"));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kBusy);
   EXPECT_NE(refused.error().message.find("psql of role postgres"), std::string::npos) << sentence(refused.error());
@@ -258,7 +244,7 @@ class SharedStoreAway : public testing::Test {
     EXPECT_TRUE(store.wait_until_writable({}));
     EXPECT_FALSE(store.state().why_not_written);
     EXPECT_TRUE(store.state().readable);
-    EXPECT_TRUE(store.add_batch(batch("after"), job_of("after")));
+    EXPECT_TRUE(store.add_batch(batch_of("after"), job_of("after")));
   }
 };
 
@@ -266,7 +252,7 @@ TEST_F(SharedStoreAway, ChangesAreRefusedTheModelInForceIsServedAndItComesBackBy
   const auto store = open();
   ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell_, 1), 0, true, "made"));
   postgres_.stop();
-  const auto refused = store->add_batch(batch("lt-07"), job_of("lt-07"));
+  const auto refused = store->add_batch(batch_of("lt-07"), job_of("lt-07"));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kBusy);
   EXPECT_GT(store->state().since, 0);
@@ -295,7 +281,7 @@ TEST_F(SharedStoreAway, AServerThatStartsMeanwhileServesWhatItSawLast) {
 TEST_F(SharedStoreAway, ADatabaseThatIsStoppedAndNotDeadIsNoticedByADeadline) {
   const auto store = open();
   postgres_.freeze(true);
-  const auto refused = store->add_batch(batch("lt-07"), job_of("lt-07"));
+  const auto refused = store->add_batch(batch_of("lt-07"), job_of("lt-07"));
   EXPECT_FALSE(refused);
   postgres_.freeze(false);
   check_it_comes_back(*store);
@@ -311,7 +297,7 @@ TEST_F(SharedStoreAway, ACommitThatTheStandbyHasNotConfirmedIsNoAcknowledgementA
   standbys("nobody");
   Result<StoredJob> unknown;
   {
-    const std::jthread asks([&] { unknown = store->add_batch(batch("lt-07"), job_of("lt-07")); });
+    const std::jthread asks([&] { unknown = store->add_batch(batch_of("lt-07"), job_of("lt-07")); });
     while (postgres_.sql(url_, "SELECT count(*) " + waiting) == "0\n") continue;
     postgres_.sql(url_, "SELECT pg_cancel_backend(pid) " + waiting);
   }
@@ -319,7 +305,7 @@ TEST_F(SharedStoreAway, ACommitThatTheStandbyHasNotConfirmedIsNoAcknowledgementA
   EXPECT_EQ(unknown.error().code, ErrorCode::kBusy);
   EXPECT_NE(unknown.error().message.find("not known"), std::string::npos) << sentence(unknown.error());
   standbys("");
-  ASSERT_TRUE(store->add_batch(batch("lt-07"), job_of("lt-07")));
+  ASSERT_TRUE(store->add_batch(batch_of("lt-07"), job_of("lt-07")));
   EXPECT_EQ(demand(store->unfinished_jobs()).size(), 1u);
 }
 

@@ -5,14 +5,10 @@
 
 #include <filesystem>
 
-#include "server/base/hash.h"
 #include "server/compensate/model_file.h"
 #include "server/store/audit.h"
-#include "server/store/store.h"
-#include "tests/support/demand.h"
+#include "tests/store/store_under_test.h"
 #include "tests/support/postgres.h"
-#include "tests/support/small_cell.h"
-#include "tests/support/temporary_folder.h"
 
 namespace trammel {
 namespace {
@@ -26,11 +22,8 @@ class StoreCopyTest : public testing::Test {
   void SetUp() override {
     const auto store = demand(Store::open(file_));
     const std::string csv("# \xC3\xA4 \xFF\0 end\r\n", 13);
-    StoredJob job;
-    job.cell = "cell-7";
-    job.batch_ids = {"lt-07"};
-    const auto made =
-        demand(store->add_batch({"cell-7", "lt-07", csv, sha256_hex(csv), "client:1", 1700000000, 1}, job));
+    const StoredJob job = test::job_of("lt-07");
+    const auto made = demand(store->add_batch(test::batch_of("lt-07", csv, "client:1"), job));
     JobOutcome outcome;
     outcome.verdict = JobVerdict::kInForce;
     outcome.after = 0.1 + 0.2;
@@ -88,11 +81,7 @@ TEST_F(StoreCopyTest, ACopyGoesOnWhereTheOtherEnded) {
   const auto store = demand(Store::open(url_));
   EXPECT_EQ(demand(store->add_model("cell-7", test::nominal_model(cell_, 3), 0, true, "made")), 3);
   const std::int64_t last = demand(store->recent_jobs("", 10)).back().id;
-  StoredJob job;
-  job.cell = "cell-7";
-  job.batch_ids = {"lt-08"};
-  const std::string csv = "q1_deg\n1\n";
-  const auto next = demand(store->add_batch({"cell-7", "lt-08", csv, sha256_hex(csv), "client:2", 1700000000, 1}, job));
+  const auto next = demand(store->add_batch(test::batch_of("lt-08"), test::job_of("lt-08")));
   EXPECT_EQ(next.id, last + 1);
 }
 

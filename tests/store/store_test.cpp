@@ -13,10 +13,9 @@
 
 #include "server/base/hash.h"
 #include "server/compensate/model_file.h"
+#include "tests/store/store_under_test.h"
 #include "tests/support/postgres.h"
 #include "tests/support/refusal.h"
-#include "tests/support/small_cell.h"
-#include "tests/support/temporary_folder.h"
 
 namespace trammel {
 namespace {
@@ -25,23 +24,14 @@ using test::Refusal;
 using test::refusal_of;
 
 /// A store, and what the tests do with it.
-class StoreUnderTest {
+class StoreOfBatches : protected test::StoreUnderTest {
  protected:
-  explicit StoreUnderTest(const std::string& database)
-      : path_(database.empty() ? folder_.file("trammel.db") : database) {}
-  void open() {
-    auto opened = Store::open(path_, folder_.file("cache"));
-    ASSERT_TRUE(opened) << opened.error().message;
-    store_ = std::move(*opened);
-  }
-  void reopen() {
-    store_.reset();
-    open();
-  }
-
+  explicit StoreOfBatches(const std::string& place) : StoreUnderTest(place) {}
   static StoredBatch batch(const std::string& id, const std::string& csv = "q1_deg\n1\n",
                            const std::string& request = "client:1") {
-    return {"cell-7", id, csv, sha256_hex(csv), request, 1700000000, 12};
+    StoredBatch batch = test::batch_of(id, csv, request);
+    batch.poses = 12;
+    return batch;
   }
   static StoredJob job() {
     StoredJob job;
@@ -49,23 +39,12 @@ class StoreUnderTest {
     job.created_at = 1700000001;
     return job;
   }
-  int add_model(int training_poses, bool put_in_force = false, std::int64_t job_id = 0) {
-    const auto version =
-        store_->add_model("cell-7", test::nominal_model(cell_, training_poses), job_id, put_in_force, "made");
-    return version.value();
-  }
-  int in_force() { return store_->version_in_force("cell-7")->value_or(0); }
-
-  test::TemporaryFolder folder_;
-  const std::string path_;
-  const std::shared_ptr<const Cell> cell_ = test::small_cell("cell-7");
-  std::unique_ptr<Store> store_;
 };
 
 /// On each kind of database.
-class StoreTest : public testing::TestWithParam<std::string>, protected StoreUnderTest {
+class StoreTest : public testing::TestWithParam<std::string>, protected StoreOfBatches {
  protected:
-  StoreTest() : StoreUnderTest(GetParam() == "file" ? "" : test::Postgres::of_program().new_store()) {}
+  StoreTest() : StoreOfBatches(GetParam() == "file" ? "" : test::Postgres::of_program().new_store()) {}
   static void SetUpTestSuite() { test::Postgres::of_program(); }
   void SetUp() override { open(); }
 };
@@ -73,9 +52,9 @@ INSTANTIATE_TEST_SUITE_P(, StoreTest, testing::Values("file", "postgresql"),
                          [](const auto& kind) { return kind.param; });
 
 /// What is said of files alone.
-class StoreFileTest : public testing::Test, protected StoreUnderTest {
+class StoreFileTest : public testing::Test, protected StoreOfBatches {
  protected:
-  StoreFileTest() : StoreUnderTest("") {}
+  StoreFileTest() : StoreOfBatches("") {}
   void SetUp() override { open(); }
 };
 
@@ -84,7 +63,7 @@ TEST_P(StoreTest, KeepsAnAcceptedBatchAndItsJobAcrossARestart) {
   ASSERT_TRUE(accepted) << accepted.error().message;
   EXPECT_EQ(accepted->batch_ids, std::vector<std::string>{"lt-07"});
   EXPECT_EQ(accepted->state, JobState::kQueued);
-  reopen();
+  restart();
   const auto kept = store_->batch("cell-7", "lt-07");
   ASSERT_TRUE(kept) << kept.error().message;
   EXPECT_EQ(kept->csv, batch("lt-07").csv);
@@ -100,7 +79,7 @@ TEST_P(StoreTest, KeepsAnAcceptedBatchAndItsJobAcrossARestart) {
 TEST_P(StoreTest, KeepsEveryByteOfABatch) {
   const std::string bytes("# \xC3\xA4 \xFF\0 end\r\n", 13);
   ASSERT_TRUE(store_->add_batch(batch("odd", bytes), job()));
-  reopen();
+  restart();
   EXPECT_EQ(store_->batch("cell-7", "odd")->csv, bytes);
 }
 
@@ -170,13 +149,13 @@ TEST_P(StoreTest, KeepsADiagnosisItsBatchAndItsFindingsAcrossARestart) {
   asked.kind = JobKind::kDiagnose;
   const auto queued = store_->add_diagnosis(asked, {"q1_deg\n1\n", true, "", ""});
   ASSERT_TRUE(queued) << queued.error().message;
-  reopen();
+  restart();
   EXPECT_EQ(store_->unfinished_jobs()->at(0).kind, JobKind::kDiagnose);
   EXPECT_TRUE(store_->diagnosis(queued->id)->apply);
   EXPECT_EQ(store_->diagnosis(queued->id)->csv, "q1_deg\n1\n");
   ASSERT_TRUE(store_->store_findings(queued->id, "{}", "<html>"));
   ASSERT_TRUE(store_->set_job_done(queued->id, "nothing found"));
-  reopen();
+  restart();
   EXPECT_EQ(store_->diagnosis(queued->id)->findings, "{}");
   EXPECT_EQ(store_->job(queued->id)->state, JobState::kDone);
   EXPECT_EQ(store_->job(queued->id)->message, "nothing found");
@@ -189,7 +168,7 @@ TEST_P(StoreTest, KeepsACheckOfTheRobotsHealthAcrossARestart) {
   const auto queued = store_->add_diagnosis(asked, {"q1_deg\n1\n", false, "", ""});
   ASSERT_TRUE(queued) << queued.error().message;
   EXPECT_EQ(queued->kind, JobKind::kCheck);
-  reopen();
+  restart();
   EXPECT_EQ(store_->unfinished_jobs()->at(0).kind, JobKind::kCheck);
   EXPECT_EQ(store_->audit()->rows.back().what, "check asked");
 }
@@ -210,7 +189,7 @@ TEST_P(StoreTest, KeepsThePagesOfTheLastDiagnosesOnlyButAllTheirFindings) {
 TEST_P(StoreTest, KeepsWhyABatchIsInQuarantineUntilItIsReleased) {
   ASSERT_TRUE(store_->add_batch(batch("lt-07"), job()));
   ASSERT_TRUE(store_->set_quarantine("cell-7", "lt-07", "another tool"));
-  reopen();
+  restart();
   EXPECT_EQ(store_->batch("cell-7", "lt-07")->quarantine, "another tool");
   EXPECT_EQ(store_->batches("cell-7")->at(0).quarantine, "another tool");
   ASSERT_TRUE(store_->set_quarantine("cell-7", "lt-07", ""));
@@ -282,7 +261,7 @@ TEST_P(StoreTest, KeepsWhenAModelWasTrainedAndTheNewestOfItsMeasurementsTaken) {
   parts.provenance.trained_at = 1'650'000'000;
   parts.provenance.measured_at = 1'600'000'000;
   ASSERT_TRUE(store_->add_model("cell-7", CompensatedModel::make(parts).value(), 0, true, ""));
-  reopen();
+  restart();
   EXPECT_EQ(store_->models("cell-7")->front().trained_at, 1'650'000'000);
   EXPECT_EQ(store_->models("cell-7")->front().measured_at, 1'600'000'000);
   EXPECT_GT(store_->models("cell-7")->front().created_at, 1'700'000'000);
@@ -366,7 +345,7 @@ TEST_P(StoreTest, StoresModelsAsVersionsOfTheirCell) {
   const auto id = store_->add_batch(batch("a"), job())->id;
   EXPECT_EQ(add_model(10), 1);
   EXPECT_EQ(add_model(20, true, id), 2);
-  reopen();
+  restart();
   const auto models = store_->models("cell-7");
   ASSERT_EQ(models->size(), 2u);
   EXPECT_FALSE(models->front().in_force);
@@ -396,7 +375,7 @@ TEST_P(StoreTest, RollsBackFurtherEachTimeAndNeverForth) {
   for (int version = 1; version <= 3; ++version) add_model(version, true);
   EXPECT_EQ(store_->previous_in_force("cell-7").value(), (std::vector{2, 1}));
   EXPECT_EQ(store_->rollback("cell-7").value(), 2);
-  reopen();
+  restart();
   EXPECT_EQ(in_force(), 2);
   EXPECT_EQ(store_->rollback("cell-7").value(), 1);
   EXPECT_EQ(in_force(), 1);
