@@ -148,13 +148,16 @@ bool cut_lease(const Parameter& lease, EditedMessage& message, Reachable& reacha
   return true;
 }
 
-/// False when there are too many of them. `locator` fits().
-bool take_locator(Reader locator, Reachable& reachable) {
+/// False when there are too many of them. `locator` fits(), and its id stands `at`.
+bool take_locator(Reader locator, Bytes at, Reachable& reachable) {
   locator.take(4);  // the kind: of another one than UDP over IPv4 nothing is sent
   const std::uint64_t port = locator.u32().value_or(0);
   constexpr std::size_t kBeforeIpv4 = 12;
   locator.take(kBeforeIpv4);
-  return reachable.sockets.add(port << 32 | locator.entity().value_or(0));
+  const std::size_t number = reachable.sockets.all().size();
+  if (!reachable.sockets.add(port << 32 | locator.entity().value_or(0))) return false;
+  reachable.stands[number] = at;
+  return true;
 }
 
 /// A reader whose partition has wildcards would get every client's replies. `list` fits().
@@ -248,7 +251,7 @@ Fault check_announcement(Bytes payload, Bytes source, EditedMessage& message, Re
     }
     if (!fits(parameter.id, Reader(parameter.value, little_endian))) return Dropped::kParameters;
     if (is_locator(parameter.id) && ++locators > kMostLocators) return Dropped::kParameters;
-    if (is_locator(parameter.id) && !take_locator(Reader(parameter.value, little_endian), reachable))
+    if (is_locator(parameter.id) && !take_locator(Reader(parameter.value, little_endian), here.first(2), reachable))
       message.put(here.first(2), std::uint16_t{kPadding}, little_endian);
     const bool names = parameter.id == kParticipantGuid || parameter.id == kEndpointGuid || parameter.id == kKeyHash;
     if (names && !is_of(parameter.value, source)) return Dropped::kSource;

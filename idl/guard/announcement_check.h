@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -29,6 +30,9 @@ class NamedSockets {
     return true;
   }
   [[nodiscard]] std::span<const std::uint64_t> all() const { return {sockets_.data(), count_}; }
+  [[nodiscard]] bool has(std::uint64_t socket) const {
+    return std::find(all().begin(), all().end(), socket) != all().end();
+  }
 
  private:
   std::array<std::uint64_t, kMost> sockets_{};
@@ -41,6 +45,7 @@ struct Reachable {
   Bytes lease{};                                     ///< where it stands; empty: none is said
   bool little_endian = true;
   NamedSockets sockets{};
+  std::array<Bytes, NamedSockets::kMost> stands{};  ///< where the id of each of the sockets' parameters stands
 };
 
 /// The payload of a participant's, writer's or reader's announcement by `source`: each length and count within its

@@ -253,9 +253,18 @@ std::optional<Dropped> MessageCheck::check_announced(const Submessage& submessag
     if (const Fault fault = check_announcement(payload, named_, edited_, reachable)) return fault;
   }
   if (is_liveliness_writer(writer) && payload.size() < 24) return Dropped::kLength;
-  if (writer != kAnnouncer || received_.relayed) return {};
+  if (!is_announcement_writer(writer) || received_.relayed) return {};
   const MutexLock lock(memory_.mutex);
   if (memory_.is_own(source_)) return {};
+  if (writer != kAnnouncer) {
+    blank_sockets(reachable, [&](std::uint64_t socket) TRAMMEL_REQUIRES(memory_.mutex) {
+      return memory_.participants.listens_at(source_, socket, received_.now);
+    });
+    return {};
+  }
+  blank_sockets(reachable, [&](std::uint64_t socket) {
+    return static_cast<std::uint32_t>(socket) == static_cast<std::uint32_t>(received_.socket);
+  });
   const auto admission =
       memory_.participants.announced(source_, received_.socket, reachable, received_.secured, received_.now);
   memory_.note_strangers();
@@ -266,6 +275,22 @@ std::optional<Dropped> MessageCheck::check_announced(const Submessage& submessag
     edited_.put(reachable.lease.first(4), lease, reachable.little_endian);
   }
   return admission.dropped;
+}
+
+/// The library would send there without end. Where none is left of an endpoint it takes those of its participant.
+template <typename Allowed>
+void MessageCheck::blank_sockets(Reachable& reachable, const Allowed& allowed) {
+  constexpr std::uint16_t kPadding = 0;
+  NamedSockets left;
+  const auto all = reachable.sockets.all();
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (allowed(all[i])) {
+      left.add(all[i]);
+    } else {
+      edited_.put(reachable.stands[i], kPadding, reachable.little_endian);
+    }
+  }
+  reachable.sockets = left;
 }
 
 std::optional<Dropped> MessageCheck::check_fragments(const Submessage& submessage) {

@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include "idl/guard/announcement_check.h"
 #include "idl/guard/dropped.h"
 #include "idl/guard/edited_message.h"
 #include "idl/guard/guard_memory.h"
@@ -44,6 +45,8 @@ class MessageCheck {
   void ignore_end(std::uint32_t writer, const Submessage& data, std::int64_t number);
   Fault check_destination(const Submessage& submessage);
   Fault check_announced(const Submessage& submessage, std::uint32_t writer, Bytes payload);
+  template <typename Allowed>
+  void blank_sockets(Reachable& reachable, const Allowed& allowed) TRAMMEL_REQUIRES(memory_.mutex);
   Fault check_fragments(const Submessage& submessage);
   Fault cut_too_large(const Submessage& submessage, Bytes payload, std::uint32_t sample_size);
   Fault check_heartbeat(const Submessage& submessage);

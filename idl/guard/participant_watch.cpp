@@ -59,7 +59,7 @@ ParticipantWatch::Admission ParticipantWatch::announced(Bytes prefix, std::uint6
   if (now - from.since > kWindow) from = {now, 0};
   if (from.participants >= kNewOfOneSocket || !has_room(key, now) || !may_be_new(now)) return {Dropped::kParticipants};
   ++from.participants;
-  participants_.at(key, now) = {now + short_lease, true, said_in(reachable)};
+  participants_.at(key, now) = {now + short_lease, true, said_in(reachable), reachable.sockets};
   strangers_.push_back({key, now + short_lease, kAnswers, reachable.sockets});
   return {{}, short_lease};
 }
@@ -68,6 +68,7 @@ void ParticipantWatch::hear_again(const EndpointKey& key, Participant& known, co
   const std::chrono::seconds lease(reachable.lease_seconds);
   known.until = now + (known.is_stranger ? std::min(lease, kStrangersLease) : lease);
   known.said = said_in(reachable);
+  known.sockets = reachable.sockets;
   if (!known.is_stranger) return note_sockets(reachable.sockets, now, known.until);
   if (Stranger* one = stranger(key))
     *one = {key, known.until, std::min(one->answers, kAnswers) + kAnswers, reachable.sockets};
@@ -87,6 +88,11 @@ void ParticipantWatch::left(Bytes prefix) {
   const EndpointKey key = key_of(prefix, 0);
   participants_.forget(key);
   forget_stranger(key);
+}
+
+bool ParticipantWatch::listens_at(Bytes prefix, std::uint64_t socket, Time now) {
+  const Participant* const known = participants_.find(key_of(prefix, 0), now);
+  return known != nullptr && known->until > now && known->sockets.has(socket);
 }
 
 void ParticipantWatch::forget_strangers(Time now) {
@@ -113,8 +119,7 @@ bool ParticipantWatch::lets_out(std::uint64_t socket, Time now) {
   if (known != nullptr && known->until > now) return true;
   bool named = false;
   for (Stranger& one : strangers_) {
-    const auto sockets = one.sockets.all();
-    if (std::find(sockets.begin(), sockets.end(), socket) == sockets.end()) continue;
+    if (!one.sockets.has(socket)) continue;
     named = true;
     if (one.answers <= 0) continue;
     --one.answers;

@@ -40,6 +40,8 @@ class ParticipantWatch {
   /// It has sent something to us, by our name: it hears us.
   void spoke(Bytes prefix, Time now);
   void left(Bytes prefix);
+  /// Whether the participant has announced that it listens there: its endpoints listen nowhere else.
+  [[nodiscard]] bool listens_at(Bytes prefix, std::uint64_t socket, Time now);
 
   [[nodiscard]] bool knows_strangers() const { return !strangers_.empty(); }
   /// If true, a datagram may be sent there: not without end where a stranger alone says that it listens.
@@ -50,6 +52,7 @@ class ParticipantWatch {
     Time until{};  ///< its lease is over
     bool is_stranger = true;
     std::uint64_t said = 0;  ///< a mix of its lease and its sockets
+    NamedSockets sockets{};
   };
   struct Socket {
     Time since{};

@@ -26,7 +26,9 @@ using test::Prefix;
 constexpr Prefix kSource = {1, 15, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11}, kOther = {1, 15, 9, 9, 9, 9, 9, 9, 9, 9, 9, 9};
 constexpr std::uint32_t kPublications = 0x000003c2, kSubscriptions = 0x000004c2;
 constexpr std::uint32_t kUserWriter = 0x00000103, kUserReader = 0x00000104;
-constexpr std::uint64_t kSocket = 4711;
+/// A socket of 127.0.0.1, as the guard numbers it.
+constexpr std::uint64_t loopback(std::uint16_t port) { return std::uint64_t{port} << 32 | 0x7f000001u; }
+constexpr std::uint64_t kSocket = loopback(4711), kOtherSocket = loopback(4712);
 const PacketBytes kSample = {0, 1, 0, 0, 1, 2, 3, 4};
 
 /// Why the guard drops it; empty: it passes.
@@ -250,9 +252,6 @@ TEST(Guard, WhoHasNotSpokenToUsYetIsAStrangerWithAShortLease) {
   EXPECT_EQ(fate(guard, announcement(without)), kPasses) << "one who is known";
 }
 
-/// A socket of 127.0.0.1, as the guard numbers it.
-std::uint64_t loopback(std::uint16_t port) { return std::uint64_t{port} << 32 | 0x7f000001u; }
-
 TEST(Guard, WhereOnlyAStrangerSaysThatItListensAFewDatagramsAreSent) {
   Guard guard(kMaxTextSample);
   const Guard::Time now = Guard::Time() + std::chrono::hours(1);
@@ -284,7 +283,7 @@ TEST(Guard, AStrangerTakesNoAnswersFromWhoIsKnown) {
   const ParameterList names = ParameterList().guid(0x0050, stranger, 0x000001c1).add(0x0002, lasting(10));
   ASSERT_TRUE(guard.check(
       Packet(stranger).data({0, kAnnouncer, 1, {}, ParameterList(names).locator(0x0032, 5).payload()}).bytes(),
-      kSocket + 1, now));
+      kOtherSocket, now));
   for (int i = 0; i < 100; ++i) EXPECT_TRUE(guard.lets_out(loopback(5), now));
 }
 
@@ -296,6 +295,46 @@ TEST(Guard, SocketsBeyondTheSixteenthAreBlanked) {
   }
   Guard guard(kMaxTextSample);
   EXPECT_EQ(let_in(guard, announcement(names)), announcement(left));
+}
+
+/// A socket of another host.
+ParameterList& add_elsewhere(ParameterList& list, std::uint16_t id, std::uint16_t port) {
+  PacketBytes locator;
+  test::put32(locator, 1);
+  test::put32(locator, port);
+  locator.resize(20);
+  test::put_bytes(locator, {192, 0, 2, 1});
+  return list.add(id, locator);
+}
+
+TEST(Guard, AParticipantListensWhereItSendsFromAndOnNoOtherHost) {
+  ParameterList names = participant(), left = participant();
+  for (ParameterList* list : {&names, &left}) {
+    const bool is_left = list == &left;
+    list->locator(0x0032, 5);
+    add_elsewhere(*list, is_left ? 0x0000 : 0x0032, 6);
+    list->locator(0x0031, 7);
+    add_elsewhere(*list, is_left ? 0x0000 : 0x0048, 8);
+  }
+  Guard guard(kMaxTextSample);
+  EXPECT_EQ(let_in(guard, announcement(names)), announcement(left));
+  speak(guard);
+  EXPECT_EQ(let_in(guard, announcement(names)), announcement(left)) << "also once it is known";
+}
+
+TEST(Guard, AnEndpointListensWhereItsParticipantDoesAndNowhereElse) {
+  Guard guard(kMaxTextSample);
+  ASSERT_FALSE(let_in(guard, announcement(participant().locator(0x0031, 5))).empty());
+  speak(guard);
+  const auto reader_at = [](std::uint16_t id, std::uint16_t port) {
+    return announcement(writer().locator(0x002f, 5).locator(id, port), kSubscriptions);
+  };
+  EXPECT_EQ(let_in(guard, reader_at(0x002f, 5)), reader_at(0x002f, 5));
+  EXPECT_EQ(let_in(guard, reader_at(0x002f, 6)), reader_at(0x0000, 6)) << "another one's port";
+  EXPECT_EQ(let_in(guard, reader_at(0x0030, 6)), reader_at(0x0000, 6)) << "a group";
+  ParameterList far = writer(), left = writer();
+  EXPECT_EQ(let_in(guard, announcement(add_elsewhere(far, 0x002f, 5), kPublications)),
+            announcement(add_elsewhere(left, 0x0000, 5), kPublications));
 }
 
 /// Says that kSource has gone.
@@ -631,7 +670,7 @@ TEST(Guard, OneSocketDoesNotInventParticipantsWithoutEnd) {
     if (guard.check(Packet(prefix).data({0, kAnnouncer, 1, {}, list.payload()}).bytes(), kSocket)) ++passed;
   }
   EXPECT_EQ(passed, ParticipantWatch::kNewOfOneSocket);
-  EXPECT_TRUE(guard.check(announcement(participant()), kSocket + 1)) << "from another socket";
+  EXPECT_TRUE(guard.check(announcement(participant()), kOtherSocket)) << "from another socket";
 }
 
 /// A participant of a socket of its own.
