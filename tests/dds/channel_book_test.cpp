@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -129,6 +131,23 @@ TEST(ChannelBook, ClientsThatDoNothingChangePlacesMoreAndMoreSeldom) {
   }
   EXPECT_LE(changes, 60);
   EXPECT_GE(changes, 10);
+}
+
+TEST(ChannelBook, AmongFewWhoeverWaitsToBeMatchedAgainWaitsForTwelveSecondsAtMost) {
+  Desk desk(2);
+  const std::vector<std::string> names = {"a", "b", "c", "d"};
+  std::map<std::string, milliseconds> waited;
+  for (const std::string& name : names) desk.comes(name);
+  milliseconds longest{0};
+  for (int i = 0; i < 1500; ++i) {  // five minutes
+    constexpr milliseconds kLook{200};
+    desk.tend(kLook);
+    for (const std::string& name : names) {
+      waited[name] = desk.has(name) ? milliseconds(0) : waited[name] + kLook;
+      longest = std::max(longest, waited[name]);
+    }
+  }
+  EXPECT_LE(longest, milliseconds(12'400));
 }
 
 TEST(ChannelBook, OnlyTheFirstWhoListensInAPartitionIsAnsweredThere) {

@@ -10,7 +10,10 @@ constexpr std::size_t kMostKnown = 4096;   // clients; more are heard when some 
 constexpr int kPartitionsOfOne = 4;        // a participant may be as many clients
 constexpr std::size_t kMostBeside = 64;    // readers of others in a client's partition
 constexpr std::size_t kOpenedAtOnce = 16;  // so that those who have a channel are not held up
-constexpr std::chrono::seconds kLongestPenalty{30};
+/// The longest penalty, for each client that is there: a change is told to all of them. Among few it is short, since
+/// some clients send nothing before they are matched.
+constexpr std::chrono::milliseconds kPenaltyOfEach{100};
+constexpr std::chrono::milliseconds kLongestAmongFew{12'000}, kLongestAmongMany{30'000};
 
 }  // namespace
 
@@ -132,8 +135,10 @@ void ChannelBook::close(Clients::iterator client, SteadyTime now, std::vector<Ch
   Client& one = client->second;
   one.is_open = false;
   one.opened.clear();
+  const auto longest =
+      std::clamp(static_cast<int>(clients_.size()) * kPenaltyOfEach, kLongestAmongFew, kLongestAmongMany);
   one.penalty = one.was_useful ? SteadyTime::duration(0)
-                               : std::min<SteadyTime::duration>(std::max(2 * one.penalty, grace_), kLongestPenalty);
+                               : std::min<SteadyTime::duration>(std::max(2 * one.penalty, grace_), longest);
   one.waits_since = now + one.penalty;
   --open_;
 }
