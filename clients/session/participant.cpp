@@ -46,11 +46,6 @@ wire::Change to_wire(const ChangeOptions& options) {
   return change;
 }
 
-bool is_same(const wire::Job& a, const wire::Job& b) {
-  return a.number() == b.number() && a.cell() == b.cell() && a.kind() == b.kind() &&
-         a.created_unix_s() == b.created_unix_s() && a.batch_ids() == b.batch_ids();
-}
-
 Result<SessionOptions> completed(SessionOptions options) {
   if (!options.discovery_servers.empty()) {
     if (const Status found = add_found_places(options); !found) return tl::make_unexpected(found.error());

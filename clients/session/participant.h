@@ -26,8 +26,6 @@ namespace trammel::client {
 [[nodiscard]] std::string make_name(const char* what);
 [[nodiscard]] std::string change_id(const ChangeOptions& options);
 [[nodiscard]] wire::Change to_wire(const ChangeOptions& options);
-/// Whether two servers tell of one job: they have one record.
-[[nodiscard]] bool is_same(const wire::Job& a, const wire::Job& b);
 /// The same options with every server as a place, and the address of this host that leads there.
 [[nodiscard]] Result<SessionOptions> completed(SessionOptions options);
 [[nodiscard]] Result<wire::ParticipantPtr> participant_of(const SessionOptions& options);

@@ -7,6 +7,12 @@
 namespace trammel::client {
 namespace {
 
+/// Whether two servers tell of one job: they have one record.
+bool is_same(const wire::Job& a, const wire::Job& b) {
+  return a.number() == b.number() && a.cell() == b.cell() && a.kind() == b.kind() &&
+         a.created_unix_s() == b.created_unix_s() && a.batch_ids() == b.batch_ids();
+}
+
 /// Adds what no other server has told already: several have one record.
 template <typename Item, typename IsSame>
 void add_new(std::vector<std::pair<Item, std::string>>& all, const std::vector<Item>& told, const std::string& server,
