@@ -82,8 +82,8 @@ void ParkedChannels::park(Channel channel, Time now) {
 }
 
 ParkedChannels::Channel ParkedChannels::take(const std::string& participant, const std::string& partition) {
-  const auto own = std::find_if(parked_.begin(), parked_.end(),
-                                [&](const Channel& one) { return one->partition() == partition; });
+  const auto own =
+      std::find_if(parked_.begin(), parked_.end(), [&](const Channel& one) { return one->partition() == partition; });
   if (own != parked_.end()) {
     Channel channel = std::move(*own);
     parked_.erase(own);
