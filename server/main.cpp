@@ -28,6 +28,7 @@
 #include "server/host/service_manager.h"
 #include "server/http/http_server.h"
 #include "server/registry/model_registry.h"
+#include "server/store/commit_safety.h"
 #include "server/store/store.h"
 #include "server/store/store_place.h"
 #include "server/trainer/compute/compute_main.h"
@@ -232,6 +233,16 @@ Result<PortLock> open_to_clients(const DdsOptions& options, DdsService& service)
   return name;
 }
 
+/// What its acknowledgements are worth, as far as the database says it now.
+void tell_record(const Store& store) {
+  const RecordState record = store.record();
+  if (record.kind != "postgresql" || record.survives.empty()) return;
+  tell(record.worry.empty() ? LogLevel::kInfo : LogLevel::kWarn, "record",
+       fmt::format("record: {}; an acknowledged change survives {}{}", record.place, record.survives,
+                   record.worry.empty() ? "" : "; " + record.worry));
+  if (const std::string missing = missing_watchdog(); !missing.empty()) tell(LogLevel::kWarn, "watchdog", missing);
+}
+
 void hangs() { end_at_once("trammeld: hangs: was asked to stop and has not stopped after 10 s; ends at once\n"); }
 
 /// Serves until a signal ends it.
@@ -240,6 +251,7 @@ Status serve(ServerConfig config, const Arguments& arguments) {
   auto store = Store::open(config.store, config.cache);
   if (!store) return tl::make_unexpected(store.error());
   (*store)->works_as(config.dds.server_id);
+  tell_record(**store);
   ModelRegistry registry(config.models_in_memory);
   Trainer trainer(config.cells, **store, registry, config.trainer);
   DdsService service(config.dds, trainer, **store, registry);

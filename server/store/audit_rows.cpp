@@ -41,11 +41,15 @@ void append(Database& database, const AuditEntry& entry, const ChangeId& by) {
       end.rows + 1, unix_now(),  by.who.empty() ? "service" : by.who,       entry.cell, entry.what, entry.subject,
       entry.before, entry.after, entry.why.empty() ? by.reason : entry.why, by.id,      end.hash,   {}};
   row.hash = hash_of(row);
-  change(database,
-         "INSERT INTO audit (number, at, who, cell, what, subject, before, after, why, request, hash_before, hash) "
-         "VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12)",
-         row.number, row.at, row.who, row.cell, row.what, row.subject, row.before, row.after, row.why, row.request,
-         row.hash_before, row.hash);
+  // The row before is looked at in the same statement: of a store that was moved services know only when they connect.
+  const int added =
+      change(database,
+             "INSERT INTO audit (number, at, who, cell, what, subject, before, after, why, request, hash_before, hash) "
+             "SELECT CAST($1 AS BIGINT), CAST($2 AS BIGINT), $3, $4, $5, $6, $7, $8, $9, $10, $11, $12 "
+             "WHERE $5 = 'reopen' OR NOT EXISTS (SELECT 1 FROM audit WHERE number = $1 - 1 AND what = 'moved')",
+             row.number, row.at, row.who, row.cell, row.what, row.subject, row.before, row.after, row.why, row.request,
+             row.hash_before, row.hash);
+  if (added == 0) throw DatabaseError(DatabaseError::Kind::kAway, "was moved elsewhere: its audit trail says where to");
   change(database, "UPDATE audit_end SET rows = $1, hash = $2", row.number, row.hash);
   // However often a transaction says it, others hear it once.
   if (database.is_shared()) static_cast<void>(exists(database, "SELECT pg_notify($1, '')", kChangesChannel));

@@ -6,6 +6,7 @@
 #include <system_error>
 #include <utility>
 
+#include "server/store/moved.h"
 #include "server/store/schema.h"
 
 namespace trammel {
@@ -69,6 +70,7 @@ Attempt open_for_writing(const std::string& path, ServedCopies& copies) {
     if (auto fine = check_there(path, copies); !fine) return fine;
     file = std::make_unique<SqliteDatabase>(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout);
     if (auto ready = prepare_file(*file, path); !ready) return ready;
+    if (auto here = check_not_moved(*file, path); !here) return here;
     return check_identity(*file, path, copies);
   });
 }
@@ -102,8 +104,9 @@ Result<OpenedDatabase> open_database(const std::string& path, ServedCopies& copi
     if (reading.file) return OpenedDatabase{std::move(reading.file), std::move(writing.why_not)};
   }
   const auto stores = copies.stores();
-  const bool is_newer = writing.why_not->field == kSchemaField;  // a newer program serves it
-  if (stores.empty() || is_newer) return tl::make_unexpected(*writing.why_not);
+  // A newer program serves it, or it is served elsewhere.
+  const bool is_served = writing.why_not->field == kSchemaField || writing.why_not->field == kMovedField;
+  if (stores.empty() || is_served) return tl::make_unexpected(*writing.why_not);
   static_cast<void>(copies.belong_to(stores.front(), false));
   return OpenedDatabase{nullptr, std::move(writing.why_not)};
 }

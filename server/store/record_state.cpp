@@ -1,25 +1,8 @@
+#include "server/store/commit_safety.h"
 #include "server/store/connection.h"
-#include "server/store/statements.h"
 #include "server/store/store.h"
 
 namespace trammel {
-namespace {
-
-/// By the settings of this connection.
-std::string survived_by_commit(Database& database) {
-  auto row = prepare(database,
-                     "SELECT current_setting('synchronous_commit'), current_setting('synchronous_standby_names'), "
-                     "current_setting('fsync')");
-  if (!row.next()) return "";
-  const std::string commit = row.text(0), standbys = row.text(1);
-  if (row.text(2) != "on") return "the end of the servers, and no crash of the database's host: fsync is off";
-  if (commit == "off") return "the end of the servers, and no crash of the database's host: synchronous_commit is off";
-  if (standbys.empty() || commit == "local") return "a crash of the database's host, and not its loss: this host only";
-  return fmt::format("the loss of the database's host: the standbys {} have it, too", standbys);
-}
-
-}  // namespace
-
 const std::string& Store::server() const { return connection_->worker.server; }
 
 std::string Store::shared_identity() const { return is_shared() ? connection_->copies->store() : std::string(); }
@@ -34,9 +17,10 @@ RecordState Store::record() const {
   if (!is_shared()) {
     record.survives = "a crash of this host, and not its loss: this host only";
   } else if (record.reachable) {
-    record.survives =
-        connection_->exclusively([](Database& database) -> Result<std::string> { return survived_by_commit(database); })
-            .value_or("");
+    const auto safety = connection_->exclusively(
+        [](Database& database) -> Result<CommitSafety> { return safety_of(commit_settings(database)); });
+    record.survives = safety ? safety->survives : "";
+    record.worry = safety ? safety->worry : "";
   }
   return record;
 }

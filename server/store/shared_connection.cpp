@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/store/audit_rows.h"
+#include "server/store/moved.h"
 #include "server/store/schema.h"
 #include "server/store/shared_schema.h"
 #include "server/store/store_place.h"
@@ -46,6 +47,7 @@ Result<std::unique_ptr<StoreConnection>> SharedConnection::open(const std::strin
 Status SharedConnection::admit(Database& database) {
   try {
     if (const Status ours = check_shared_schema(database, path); !ours) return ours;
+    if (const Status here = check_not_moved(database, path); !here) return here;
     const std::string id = text_of(database, "SELECT id FROM store_identity WHERE id <> ''");
     const auto known = copies->stores();
     if (!known.empty() && std::find(known.begin(), known.end(), id) == known.end())
@@ -201,9 +203,9 @@ void SharedConnection::wait_for_change(const std::stop_token& stop, std::chrono:
 Status SharedConnection::try_again() {
   if (!state().why_not_written) return {};
   return run(
-      [](Database& database) -> Status {
+      [this](Database& database) -> Status {
         change(database, "UPDATE store_identity SET id = id");
-        return {};
+        return check_not_moved(database, path);
       },
       Transaction::For::kWriting);
 }

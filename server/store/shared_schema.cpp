@@ -41,6 +41,14 @@ struct Schema {
   std::int64_t works_from = 0;
 };
 
+Failure too_new(std::int64_t version, const std::string& place) {
+  return refused("schema {} is newer than this program's, limit {}", version, newest())
+      .in(place)
+      .of(kSchemaField)
+      .beyond(version, newest())
+      .next("start a newer one");
+}
+
 /// 0: the database is empty.
 Result<Schema> schema_of(Database& database, const std::string& place) {
   if (!database.has_table("trammel_schema")) {
@@ -51,11 +59,7 @@ Result<Schema> schema_of(Database& database, const std::string& place) {
   if (!row.next()) return refused("its schema has no number").in(place);
   const Schema schema{row.integer64(0), row.integer64(1)};
   if (schema.works_from <= newest()) return schema;
-  return refused("schema {} is newer than this program's, limit {}", schema.version, newest())
-      .in(place)
-      .of(kSchemaField)
-      .beyond(schema.version, newest())
-      .next("start a newer one");
+  return too_new(schema.version, place);
 }
 
 }  // namespace
@@ -71,6 +75,13 @@ Status check_shared_schema(Database& database, const std::string& place) {
       .of(kSchemaField)
       .beyond(schema->version, newest())
       .next(init);
+}
+
+Status check_all_is_known(Database& database, const std::string& place) {
+  const auto schema = schema_of(database, place);
+  if (!schema) return tl::make_unexpected(schema.error());
+  if (schema->version <= newest()) return {};
+  return too_new(schema->version, place);
 }
 
 Status migrate_shared_schema(Database& database, const std::string& place) {
@@ -92,6 +103,21 @@ Status migrate_shared_schema(Database& database, const std::string& place) {
   return {};
 }
 
+namespace {
+
+/// So that a service can say what a change survives. Only some owners may give that; without it, the service says so.
+void let_see_standbys(Database& database, const std::string& role) {
+  try {
+    Transaction transaction(database, Transaction::For::kWriting);
+    database.execute(fmt::format("GRANT pg_read_all_stats TO {}", role));
+    transaction.commit();
+  } catch (const DatabaseError& error) {
+    if (error.kind() != DatabaseError::Kind::kRefused) throw;
+  }
+}
+
+}  // namespace
+
 Status grant_shared_store(Database& database, const std::string& role) {
   if (text_of(database, "SELECT current_user") == role)
     return refused("role {} owns the store, and could change its audit trail", role).next("grant it to another role");
@@ -107,6 +133,7 @@ Status grant_shared_store(Database& database, const std::string& role) {
                   "REVOKE INSERT, UPDATE, DELETE, TRUNCATE ON trammel_schema FROM {0}",
                   to, in));
   transaction.commit();
+  let_see_standbys(database, to);
   return {};
 }
 

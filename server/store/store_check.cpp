@@ -11,6 +11,8 @@
 #include <system_error>
 
 #include "server/store/file_header.h"
+#include "server/store/moved.h"
+#include "server/store/open_database.h"
 #include "server/store/open_to_read.h"
 #include "server/store/store_place.h"
 #include "server/store/writer_lock.h"
@@ -82,11 +84,28 @@ Status check_file(const fs::path& path) {
   return check_header(path);
 }
 
+/// What else is wrong with it is seen when it is opened.
+Status check_file_is_here(const fs::path& path) {
+  std::error_code error;
+  if (!fs::exists(path, error) || fs::file_size(path, error) == 0) return {};
+  try {
+    // Without its journal, of which a look at it would leave traces: a store is moved when nobody serves it.
+    SqliteDatabase file(immutable_uri(path.string()), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
+    return check_not_moved(file, path.string());
+  } catch (const DatabaseError&) {
+    return {};
+  }
+}
+
 }  // namespace
 
 Status check_store(const std::string& path) {
-  if (is_postgres_url(path)) return look_into(path, [](Database&) -> Status { return {}; });
-  return check_folder(path).and_then([&] { return check_file(path); }).and_then([&] { return WriterLock::look(path); });
+  if (is_postgres_url(path))
+    return look_into(path, [&](Database& database) { return check_not_moved(database, spoken_place(path)); });
+  return check_folder(path)
+      .and_then([&] { return check_file(path); })
+      .and_then([&] { return WriterLock::look(path); })
+      .and_then([&] { return check_file_is_here(path); });
 }
 
 }  // namespace trammel

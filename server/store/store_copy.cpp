@@ -7,6 +7,7 @@
 #include "server/store/audit_rows.h"
 #include "server/store/database/postgres_database.h"
 #include "server/store/database/sqlite_database.h"
+#include "server/store/moved.h"
 #include "server/store/new_store_file.h"
 #include "server/store/open_database.h"
 #include "server/store/open_to_read.h"
@@ -85,8 +86,8 @@ void count_on(Database& database) {
 /// Copies every row, and reads every row again.
 Result<StoreContent> fill(Database& source, const std::string& from, Database& target, const std::string& to,
                           const Progress& progress) {
-  const Transaction moment(source, Transaction::For::kReading);
   Transaction transaction(target, Transaction::For::kWriting);
+  target.take_long();
   if (const Status room = make_room(target, to); !room) return tl::make_unexpected(room.error());
   std::int64_t total = 1, done = 0;
   for (const StoreTable& table : store_tables()) total += rows_of(source, table.name);
@@ -137,27 +138,81 @@ Result<StoreContent> copy_to_database(Database& source, const std::string& from,
   return fill(source, from, **target, to, progress);
 }
 
+Result<StoreContent> copy_to(Database& source, const std::string& from, const std::string& to,
+                             const Progress& progress) {
+  const Status known = source.is_shared() ? check_all_is_known(source, from) : Status();
+  if (!known) return tl::make_unexpected(known.error());
+  return is_postgres_url(to) ? copy_to_database(source, from, to, progress) : copy_to_file(source, from, to, progress);
+}
+
+/// Nothing of it changes until the open transaction ends: who changes something is told who holds it locked.
+void keep_as_it_is(Database& database) {
+  if (database.is_shared()) database.execute("LOCK TABLE jobs, audit_end IN EXCLUSIVE MODE");
+}
+
+/// The copy is whole. A file was only read until now.
+void mark_as_moved(Database& source, Transaction& moment, const std::string& from, const std::string& to) {
+  if (source.is_shared()) {
+    record_move(source, spoken_place(to));
+    return moment.commit();
+  }
+  const auto file = open_to_write(from);
+  if (!file) throw DatabaseError(DatabaseError::Kind::kOther, file.error().message);
+  Transaction transaction(**file, Transaction::For::kWriting);
+  record_move(**file, spoken_place(to));
+  transaction.commit();
+}
+
+Result<StoreContent> move_store(const std::string& from, const std::string& to, const Progress& progress) {
+  const std::string said = spoken_place(from);
+  const auto source = is_postgres_url(from) ? open_to_write(from) : open_to_read(from);
+  if (!source) return tl::make_unexpected(source.error());
+  Transaction moment(**source, (*source)->is_shared() ? Transaction::For::kWriting : Transaction::For::kReading);
+  keep_as_it_is(**source);
+  (*source)->take_long();
+  if (const Status here = check_not_moved(**source, said); !here) return tl::make_unexpected(here.error());
+  auto content = copy_to(**source, said, to, progress);
+  if (!content) return content;
+  try {
+    mark_as_moved(**source, moment, from, to);
+  } catch (const DatabaseError& error) {
+    return failure(ErrorCode::kInternal, "{} is whole, but this one could not be marked as moved there: {}",
+                   spoken_place(to), error.what())
+        .in(said)
+        .next("see that nobody serves this one any more");
+  }
+  return content;
+}
+
+Result<StoreContent> copy_and_keep(const std::string& from, const std::string& to, const Progress& progress) {
+  const auto source = open_to_read(from);
+  if (!source) return tl::make_unexpected(source.error());
+  const Transaction moment(**source, Transaction::For::kReading);
+  (*source)->take_long();
+  return copy_to(**source, spoken_place(from), to, progress);
+}
+
 }  // namespace
 
 Result<StoreContent> look_through_store(const std::string& place) {
-  return look_into(place, [&](Database& database) { return content_of(database, spoken_place(place)); });
+  return look_into(place, [&](Database& database) {
+    database.take_long();
+    return content_of(database, spoken_place(place));
+  });
 }
 
-Result<StoreContent> copy_store(const std::string& from, const std::string& to, const Progress& progress) {
+Result<StoreContent> copy_store(const std::string& from, const std::string& to, SourceAfter source,
+                                const Progress& progress) {
   std::optional<WriterLock> nobody_writes;
   if (!is_postgres_url(from)) {
     auto lock = WriterLock::take(from);
     if (!lock) return tl::make_unexpected(lock.error());
     nobody_writes.emplace(std::move(*lock));
   }
-  const std::string said = spoken_place(from);
   try {
-    auto source = open_to_read(from);
-    if (!source) return tl::make_unexpected(source.error());
-    return is_postgres_url(to) ? copy_to_database(**source, said, to, progress)
-                               : copy_to_file(**source, said, to, progress);
+    return source == SourceAfter::kMoved ? move_store(from, to, progress) : copy_and_keep(from, to, progress);
   } catch (const DatabaseError& error) {
-    return failure_of(error, said);
+    return failure_of(error, spoken_place(from));
   }
 }
 

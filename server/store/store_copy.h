@@ -26,10 +26,17 @@ struct StoreContent {
 /// of the audit trail. Changes nothing. Refuses (kInternal) what is damaged.
 [[nodiscard]] Result<StoreContent> look_through_store(const std::string& place);
 
-/// Moves a store that nobody writes, from a file or database to another, with all that was ever in it: the same
-/// versions, the same trail, the same identity. It is verified table by table before it counts. The trail of the new
-/// one then says where it came from. Refuses a target that is not empty. `progress`: the share that is done.
-[[nodiscard]] Result<StoreContent> copy_store(const std::string& from, const std::string& to,
+/// What becomes of the store that was copied.
+enum class SourceAfter {
+  kMoved,  ///< its trail says where it went, and no server serves it any more
+  kKept    ///< it stays as it is: the copy is one to try, or to keep
+};
+
+/// Copies a store, a file or database, to another, with all that was ever in it: the same versions, the same trail, the
+/// same identity. It is verified table by table before it counts. The trail of the new one then says where it came from.
+/// A file must not be served meanwhile; of a database that is moved the services change nothing meanwhile, and nothing
+/// afterwards. Refuses a target that is not empty. `progress`: the share that is done.
+[[nodiscard]] Result<StoreContent> copy_store(const std::string& from, const std::string& to, SourceAfter source,
                                               const std::function<void(double)>& progress = nullptr);
 
 }  // namespace trammel

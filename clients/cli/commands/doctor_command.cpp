@@ -20,6 +20,7 @@
 #include "clients/cli/terminal/output.h"
 #include "server/base/part_file.h"
 #include "server/base/plain_text.h"
+#include "server/store/commit_safety.h"
 #include "server/store/store.h"
 #include "server/store/store_check.h"
 #include "server/store/store_place.h"
@@ -197,8 +198,13 @@ Found leftovers(const std::vector<fs::path>& folders) {
 /// What a change that a server of this record has acknowledged is safe from.
 void look_at_record(const std::string& url, std::vector<Found>& found) {
   const auto store = Store::open(url);
-  const std::string survives = store ? (*store)->record().survives : "";
-  if (!survives.empty()) found.push_back({"record", State::kGood, "an acknowledged change survives " + survives, ""});
+  const RecordState record = store ? (*store)->record() : RecordState();
+  if (!record.survives.empty()) {
+    found.push_back({"record", record.worry.empty() ? State::kGood : State::kNote,
+                     "an acknowledged change survives " + record.survives, record.worry});
+  }
+  if (const std::string missing = missing_watchdog(); !missing.empty())
+    found.push_back({"watchdog", State::kNote, missing.substr(0, missing.find("; ")), missing.substr(missing.find("; ") + 2)});
 }
 
 void look_at_store(const std::string& path, std::vector<Found>& found) {
@@ -278,8 +284,8 @@ void add_doctor_command(CLI::App& app, Action& chosen) {
   arguments->service.timeout_s = 2;
   CLI::App* command = app.add_subcommand(
       "doctor", "Look at this machine for what keeps a service from working, and say what to do about it");
-  command->add_option("--store", arguments->store, "File of a server's store (its key store), to look at it, too")
-      ->type_name("FILE");
+  command->add_option("--store", arguments->store, "A server's store (its key store), a file or a URL, to look at it, too")
+      ->type_name("STORE");
   add_json_option(*command, arguments->json);
   add_options_of_service_command(*command, arguments->service);
   command->callback([arguments, &chosen] { chosen = [arguments] { return examine(*arguments); }; });

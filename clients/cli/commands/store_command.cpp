@@ -3,6 +3,7 @@
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
+#include "server/store/moved.h"
 #include "server/store/store_copy.h"
 #include "server/store/store_init.h"
 #include "server/store/store_place.h"
@@ -13,6 +14,7 @@ namespace {
 
 struct StoreArguments {
   std::string place, to, role, json;
+  bool keep_source = false;
 };
 
 std::string text_of(const std::string& place, const StoreContent& content) {
@@ -55,8 +57,17 @@ Status check(const StoreArguments& arguments) {
 
 Status copy(const StoreArguments& arguments) {
   ProgressLine line;
-  return say(copy_store(arguments.place, arguments.to, [&line](double share) { line.show("copying", share); }),
+  return say(copy_store(arguments.place, arguments.to,
+                        arguments.keep_source ? SourceAfter::kKept : SourceAfter::kMoved,
+                        [&line](double share) { line.show("copying", share); }),
              arguments.to, arguments);
+}
+
+Status reopen(const StoreArguments& arguments) {
+  if (const Status open = reopen_store(arguments.place); !open) return open;
+  const std::string place = spoken_place(arguments.place);
+  tell(fmt::format("{} may be served again\n", place), {arguments.json});
+  return write_json(arguments.json, {{"place", place}});
 }
 
 using Run = Status (*)(const StoreArguments&);
@@ -86,10 +97,17 @@ void add_store_command(CLI::App& app, Action& chosen) {
   checked->add_option("STORE", arguments->place, "A file, or a URL of PostgreSQL")->required();
   CLI::App* copied =
       add(*store, chosen, "copy", "Move a store that no service writes, verified table by table", copy, arguments);
+  copied->add_flag("--keep-source", arguments->keep_source,
+                   "It stays as it is, to be served further. Without this no server serves it any more");
   copied->add_option("FROM", arguments->place, "A file, or a URL of PostgreSQL")->required();
   copied->add_option("TO", arguments->to, "The same; a file that is not there, or a database that is empty")
       ->required();
-  copied->footer("Stop the services first: what they write meanwhile is not copied. Then name TO in the server file.");
+  copied->footer(
+      "Stop the services first. Then name TO in the server file. The audit trail of FROM ends with where it went, and\n"
+      "servers refuse it from then on; `store reopen` takes that back.");
+  CLI::App* reopened = add(*store, chosen, "reopen", "Have a store served again that was moved, since TO is given up",
+                           reopen, arguments);
+  reopened->add_option("STORE", arguments->place, "A file, or a URL of PostgreSQL")->required();
 }
 
 }  // namespace trammel::cli

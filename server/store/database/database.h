@@ -113,6 +113,9 @@ class Database {
   [[nodiscard]] virtual bool has_table(const std::string& name) = 0;
   /// Several processes write it at a time: what a decision rests on is locked row by row, and there are roles.
   [[nodiscard]] virtual bool is_shared() const = 0;
+  /// The open transaction is of a size of its own (a whole store is read or written): it may take its time, also
+  /// between two statements.
+  virtual void take_long() {}
 
   /// Work that the open transaction does as its last, just before it is committed: what everybody waits for is locked
   /// for as short as can be, and always in the same order.

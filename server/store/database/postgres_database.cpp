@@ -9,6 +9,7 @@
 #include <random>
 #include <vector>
 
+#include "server/store/database/host_addresses.h"
 #include "server/store/database/postgres_settings.h"
 
 namespace trammel {
@@ -20,10 +21,13 @@ using Kind = DatabaseError::Kind;
 constexpr milliseconds kPerHost{1000};  // to connect to one
 constexpr milliseconds kAnswer{6000};   // longer than the server's own limit below
 constexpr milliseconds kCommit{10000};  // it may wait for a standby
+constexpr milliseconds kLongWork{600000};
 constexpr int kOldestServer = 130000;   // gen_random_uuid()
 constexpr const char* kLimits =
     "SET LOCAL statement_timeout = '5s'; SET LOCAL lock_timeout = '2s'; "
     "SET LOCAL idle_in_transaction_session_timeout = '10s'";
+
+constexpr std::string_view kWarning = "01000";
 
 /// OIDs of the types that the store has (pg_type.dat).
 constexpr Oid kBool = 16, kInt8 = 20, kInt2 = 21, kInt4 = 23, kFloat8 = 701;
@@ -162,10 +166,14 @@ std::string why_not_connected(PGconn* connection) {
 /// is not there libpq has no SQLSTATE, so these are the server's own words.
 bool is_refused_for_good(PGconn* connection, const std::string& told) {
   if (::PQconnectionNeedsPassword(connection) != 0) return true;
-  if (told.find("FATAL:") == std::string::npos) return false;
-  const auto says = [&told](const char* what) { return told.find(what) != std::string::npos; };
-  return !says("starting up") && !says("not yet accepting") && !says("shutting down") && !says("recovery") &&
-         !says("too many") && !says("slots");
+  const std::size_t at = told.find("FATAL:");
+  if (at == std::string::npos) return false;
+  const auto says = [why = told.substr(at)](const char* what) { return why.find(what) != std::string::npos; };
+  // The last four are a pooler's, whose server is away.
+  constexpr std::array kForNow = {"starting up",  "not yet accepting", "shutting down",      "recovery",      "too many",
+                                  "slots",        "server login",      "query_wait_timeout", "cannot connect",
+                                  "connect failed"};
+  return std::none_of(kForNow.begin(), kForNow.end(), says);
 }
 
 /// As the server told when it was connected; a pooler may leave that out.
@@ -219,17 +227,27 @@ Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect(const std::s
   if (!hosts) return tl::make_unexpected(hosts.error());
   std::shuffle(hosts->begin(), hosts->end(), std::mt19937_64(std::random_device{}()));
   std::optional<Error> why;
+  const auto keep = [&why](const Error& error) {
+    if (!why || error.code == ErrorCode::kRefused) why = error;
+  };
   for (const PostgresSettings& host : *hosts) {
-    auto made = connect_to_one(host, session);
-    if (made) return made;
-    if (!why || made.error().code == ErrorCode::kRefused) why = made.error();
+    const auto places = with_addresses(host, kPerHost);
+    if (!places) {
+      keep(places.error());
+      continue;
+    }
+    for (const PostgresSettings& place : *places) {
+      auto made = connect_to_one(place, session);
+      if (made) return made;
+      keep(made.error());
+    }
   }
   return tl::make_unexpected(*why);
 }
 
 void PostgresDatabase::note_warning(void* self, const PGresult* warning) {
   const char* code = ::PQresultErrorField(warning, PG_DIAG_SQLSTATE);
-  static_cast<PostgresDatabase*>(self)->warned_ = code == nullptr ? "" : code;
+  if (code != nullptr && std::string_view(code) == kWarning) static_cast<PostgresDatabase*>(self)->warned_ = true;
 }
 
 void PostgresDatabase::lose(const std::string& why) {
@@ -274,13 +292,22 @@ PostgresDatabase::Answer PostgresDatabase::ask(const char* sql, Values values) {
   const Bound bound(values);
   check_sent(::PQsendQueryParams(connection_.get(), sql, bound.size(), nullptr, bound.starts(), bound.lengths(),
                                  bound.formats(), 1));
-  return answer(std::chrono::steady_clock::now() + kAnswer);
+  return answer(by_when(kAnswer));
 }
 
 void PostgresDatabase::execute(const std::string& statements) {
   if (lost_) lose("");
   check_sent(::PQsendQuery(connection_.get(), statements.c_str()));
-  static_cast<void>(answer(std::chrono::steady_clock::now() + kAnswer));
+  static_cast<void>(answer(by_when(kAnswer)));
+}
+
+PostgresDatabase::Deadline PostgresDatabase::by_when(milliseconds limit) const {
+  return std::chrono::steady_clock::now() + (takes_long_ ? std::max(limit, kLongWork) : limit);
+}
+
+void PostgresDatabase::take_long() {
+  execute("SET LOCAL statement_timeout = 0; SET LOCAL idle_in_transaction_session_timeout = 0");
+  takes_long_ = true;
 }
 
 bool PostgresDatabase::hears(milliseconds limit) {
@@ -311,16 +338,17 @@ bool PostgresDatabase::has_table(const std::string& name) {
 }
 
 void PostgresDatabase::begin(bool writes) {
+  takes_long_ = false;
   execute(fmt::format("BEGIN ISOLATION LEVEL {}; {}",
                       writes ? "READ COMMITTED READ WRITE" : "REPEATABLE READ READ ONLY", kLimits));
 }
 
 void PostgresDatabase::commit() {
-  warned_.clear();
+  warned_ = false;
   try {
     if (lost_) lose("");
     check_sent(::PQsendQuery(connection_.get(), "COMMIT"));
-    const Answer made = answer(std::chrono::steady_clock::now() + kCommit);
+    const Answer made = answer(by_when(kCommit));
     if (std::strcmp(::PQcmdStatus(made.get()), "COMMIT") != 0)
       throw DatabaseError(Kind::kAgain, "the transaction was rolled back");
   } catch (const DatabaseError& error) {
@@ -329,7 +357,7 @@ void PostgresDatabase::commit() {
     throw;
   }
   // It is a success for the server, and on this host alone: the wait for the standby was ended.
-  if (warned_ == "01000") throw DatabaseError(Kind::kUnknown, "the standby has not confirmed it", "PostgreSQL 01000");
+  if (warned_) throw DatabaseError(Kind::kUnknown, "the standby has not confirmed it", "PostgreSQL 01000");
 }
 
 void PostgresDatabase::roll_back() noexcept {

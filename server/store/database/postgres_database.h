@@ -27,6 +27,7 @@ class PostgresDatabase final : public Database {
   int change(const char* sql, Values values) override;
   [[nodiscard]] bool has_table(const std::string& name) override;
   [[nodiscard]] bool is_shared() const override { return true; }
+  void take_long() override;
 
   /// Whether a word came, within `limit`, of a channel that it listens to.
   [[nodiscard]] bool hears(std::chrono::milliseconds limit);
@@ -51,13 +52,15 @@ class PostgresDatabase final : public Database {
   [[nodiscard]] Answer ask(const char* sql, Values values);
   /// The last answer to what was sent.
   [[nodiscard]] Answer answer(Deadline deadline);
+  [[nodiscard]] Deadline by_when(std::chrono::milliseconds limit) const;
   void wait(short events, Deadline deadline);
   [[noreturn]] void lose(const std::string& why);
   void check_sent(int sent);
 
   Connection connection_;
   bool lost_ = false;
-  std::string warned_;  // SQLSTATE of the last warning
+  bool warned_ = false;      // a warning came: during a commit, that no standby has confirmed it
+  bool takes_long_ = false;  // of the open transaction
 };
 
 }  // namespace trammel

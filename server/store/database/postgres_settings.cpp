@@ -6,6 +6,8 @@
 #include <array>
 #include <memory>
 
+#include "server/store/database/host_addresses.h"
+
 namespace trammel {
 namespace {
 
@@ -71,6 +73,21 @@ Result<std::vector<PostgresSettings>> settings_of(const std::string& url) {
     if (const auto port = nth(at, i); !port.empty()) one.emplace_back("port", port);
     each.push_back(std::move(one));
   }
+  return each;
+}
+
+Result<std::vector<PostgresSettings>> with_addresses(const PostgresSettings& host, std::chrono::milliseconds limit) {
+  const auto value = [&host](std::string_view key) {
+    const auto found = std::find_if(host.begin(), host.end(), [&](const auto& one) { return one.first == key; });
+    return found == host.end() ? std::string() : found->second;
+  };
+  const std::string name = value("host");
+  const bool is_socket = name.empty() || name.front() == '/' || name.front() == '@';
+  if (is_socket || !value("hostaddr").empty()) return std::vector<PostgresSettings>{host};
+  const auto addresses = addresses_of(name, limit);
+  if (!addresses) return tl::make_unexpected(addresses.error());
+  std::vector<PostgresSettings> each;
+  for (const std::string& address : *addresses) each.emplace_back(host).emplace_back("hostaddr", address);
   return each;
 }
 
