@@ -97,11 +97,20 @@ Status check_file_is_here(const fs::path& path) {
   }
 }
 
+Status check_database(const std::string& url) {
+  const std::string place = spoken_place(url);
+  try {
+    const auto database = open_to_write(url);
+    return database ? check_not_moved(**database, place) : tl::make_unexpected(database.error());
+  } catch (const DatabaseError& error) {
+    return unreadable(error, place);
+  }
+}
+
 }  // namespace
 
 Status check_store(const std::string& path) {
-  if (is_postgres_url(path))
-    return look_into(path, [&](Database& database) { return check_not_moved(database, spoken_place(path)); });
+  if (is_postgres_url(path)) return check_database(path);
   return check_folder(path)
       .and_then([&] { return check_file(path); })
       .and_then([&] { return WriterLock::look(path); })

@@ -57,23 +57,46 @@ Postgres& Postgres::of_program() {
   return one;
 }
 
-Postgres::Postgres() {
+Postgres::Postgres(Disk disk) : disk_(disk) {
   give_to_its_user(folder_.path());
   const Finished made = run(as_its_user({program("initdb"), "-D", data(), "-U", "postgres", "-A", "trust", "-E", "UTF8",
                                          "--locale=C.UTF-8", "--no-sync"}),
                             kPatience);
   if (made.exit_code != 0) give_up(made.err);
+  folder_.write("data/pg_hba.conf", "local all needs_password scram-sha-256\nlocal all all trust\n");
   start();
+  if (disk_ == Disk::kSmall)
+    sql(url("postgres"), fmt::format("CREATE TABLESPACE small LOCATION '{}/space'", small_disk()));
   sql(url("postgres"), "CREATE DATABASE template_store");
   if (const Status ready = init_store(url("template_store")); !ready) give_up(sentence(ready.error()));
 }
 
 Postgres::~Postgres() { stop(); }
 
-void Postgres::start() {
-  server_.emplace(as_its_user({program("postgres"), "-D", data(), "-k", folder_.path().string(), "-c",
-                               "listen_addresses=", "-c", "fsync=off", "-c", "max_connections=60"}));
-  if (!server_->wait_for_line("ready to accept connections", kPatience)) give_up(server_->standard_error());
+void Postgres::start() { start_until("ready to accept connections"); }
+
+void Postgres::start_until(const std::string& line) {
+  auto command = as_its_user({program("postgres"), "-D", data(), "-k", folder_.path().string(), "-c",
+                              "listen_addresses=", "-c", "fsync=off", "-c", "max_connections=60"});
+  if (disk_ == Disk::kSmall) {
+    // Mounted for the server alone: it goes with it.
+    constexpr const char* kMounted =
+        "set -e; mkdir -p \"$0\"; mount -t tmpfs -o size=64m tmpfs \"$0\"; mkdir \"$0/space\"; "
+        "chown -R postgres \"$0\"; head -c 16M /dev/zero >\"$0/ballast\"; exec \"$@\"";
+    command.insert(command.begin(), {"/usr/bin/unshare", "--mount", "/bin/bash", "-c", kMounted, small_disk()});
+  }
+  server_.emplace(command);
+  if (!server_->wait_for_line(line, kPatience)) give_up(server_->standard_error());
+}
+
+void Postgres::become_standby() {
+  stop();
+  folder_.write("data/standby.signal", "");
+  start_until("ready to accept read-only connections");
+}
+
+void Postgres::make_room() const {
+  fs::remove(fmt::format("/proc/{}/root{}/ballast", server_->pid(), small_disk()));
 }
 
 void Postgres::stop() {
@@ -107,9 +130,9 @@ std::string Postgres::new_database() {
   return url(name);
 }
 
-std::string Postgres::new_store() {
+std::string Postgres::new_store(const std::string& more) {
   const std::string name = fmt::format("test_{}", ++databases_);
-  sql(url("postgres"), fmt::format("CREATE DATABASE {} TEMPLATE template_store", name));
+  sql(url("postgres"), fmt::format("CREATE DATABASE {} TEMPLATE template_store {}", name, more));
   // A store of its own, and no copy of the template.
   sql(url(name), "UPDATE store_identity SET id = md5(random()::text)");
   return url(name);

@@ -14,28 +14,38 @@ class Postgres {
  public:
   /// Started when it is asked for first.
   static Postgres& of_program();
-  Postgres();
+  /// kSmall: it also has a disk of 64 MB, the tablespace `small` with a ballast of 16 MB.
+  enum class Disk { kOwn, kSmall };
+  explicit Postgres(Disk disk = Disk::kOwn);
   ~Postgres();
   Postgres(const Postgres&) = delete;
   Postgres& operator=(const Postgres&) = delete;
 
   /// The URL of a new database: an empty one, or one that is a store already.
   [[nodiscard]] std::string new_database();
-  [[nodiscard]] std::string new_store();
-  /// Of a database, for a role.
+  [[nodiscard]] std::string new_store(const std::string& more = "");
+  /// Of a database, for a role. The role `needs_password` is let in with one only.
   [[nodiscard]] std::string url(const std::string& database, const std::string& role = "postgres") const;
   /// What a statement says in that database, a line a row; aborts where it fails.
   std::string sql(const std::string& url, const std::string& statement) const;
 
   void start();
   void stop();
+  /// From now on it answers, and takes no change: the standby of nobody.
+  void become_standby();
+  /// Takes the ballast from the small disk.
+  void make_room() const;
   /// SIGSTOP and SIGCONT for all of its processes: it is there and answers nothing.
   void freeze(bool frozen) const;
 
  private:
   [[nodiscard]] std::string data() const { return folder_.file("data"); }
 
+  [[nodiscard]] std::string small_disk() const { return folder_.file("small"); }
+  void start_until(const std::string& line);
+
   TemporaryFolder folder_;
+  const Disk disk_;
   std::optional<Process> server_;
   int databases_ = 0;
 };

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <memory>
+#include <set>
+#include <string>
+
+#include "tests/support/change_load.h"
+#include "tests/support/daemon.h"
+#include "tests/support/patroni.h"
+
+namespace trammel::test {
+
+/// Two servers whose record is a PostgreSQL of three hosts; a training host, killed since, has made versions 1 and 2 of
+/// cell-7.
+class FailingOver {
+ public:
+  FailingOver();
+  /// As Patroni says it; nothing else may be asked then.
+  [[nodiscard]] const std::string& why_not() const { return record.why_not(); }
+  [[nodiscard]] client::SessionOptions session_options() const;
+
+  /// Of what was acknowledged what the record does not hold.
+  [[nodiscard]] std::set<std::string> lost(const ChangeLoad& load) const;
+  /// Changes and jobs that stand twice, and what is wrong with the trail; empty: nothing.
+  [[nodiscard]] std::string twice() const;
+
+  Patroni record;
+  std::string url;
+  std::unique_ptr<Daemon> first, second;
+
+ private:
+  void start(Daemon& server, const std::string& keys) const;
+};
+
+}  // namespace trammel::test
