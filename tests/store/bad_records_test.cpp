@@ -47,25 +47,20 @@ std::set<std::string> batches_of(Store& store) {
 /// The same database for another role, perhaps with a password.
 std::string as(std::string url, const std::string& who) { return url.replace(url.find("postgres@"), 8, who); }
 
+/// All on one server.
 class BadRecord : public testing::Test {
  protected:
-  std::unique_ptr<Store> open(const std::string& url) { return demand(Store::open(url, folder_.file("cache"))); }
-
-  test::TemporaryFolder folder_;
-  const std::shared_ptr<const Cell> cell_ = test::small_cell("cell-7");
-};
-
-class BadRecordOfOneServer : public BadRecord {
- protected:
   static void SetUpTestSuite() { Postgres::of_program(); }
+  std::unique_ptr<Store> open(const std::string& url) { return demand(Store::open(url, folder_.file("cache"))); }
   std::string say(const std::string& sql) { return postgres_.sql(url_, sql); }
 
   Postgres& postgres_ = Postgres::of_program();
   const std::string url_ = postgres_.new_store();
+  test::TemporaryFolder folder_;
+  const std::shared_ptr<const Cell> cell_ = test::small_cell("cell-7");
 };
 
-TEST_F(BadRecordOfOneServer, AWrongPasswordAndNoneAreRefusedWithoutSayingIt) {
-  say("CREATE ROLE needs_password LOGIN PASSWORD 'right'");
+TEST_F(BadRecord, AWrongPasswordAndNoneAreRefusedWithoutSayingIt) {
   ASSERT_TRUE(init_store(url_, "needs_password"));
   EXPECT_TRUE(Store::open(as(url_, "needs_password:right")));
   for (const char* who : {"needs_password:s3cret", "needs_password"}) {
@@ -81,8 +76,7 @@ TEST_F(BadRecordOfOneServer, AWrongPasswordAndNoneAreRefusedWithoutSayingIt) {
   }
 }
 
-TEST_F(BadRecordOfOneServer, APasswordThatIsChangedWhileItServesStopsChangesUntilItIsRightAgain) {
-  say("CREATE ROLE needs_password LOGIN PASSWORD 'right'");
+TEST_F(BadRecord, APasswordThatIsChangedWhileItServesStopsChangesUntilItIsRightAgain) {
   ASSERT_TRUE(init_store(url_, "needs_password"));
   const auto store = open(as(url_, "needs_password:right"));
   ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell_, 1), 0, true, "made"));
@@ -98,7 +92,7 @@ TEST_F(BadRecordOfOneServer, APasswordThatIsChangedWhileItServesStopsChangesUnti
   EXPECT_TRUE(store->add_batch(batch("lt-07"), job_of("lt-07")));
 }
 
-TEST_F(BadRecordOfOneServer, WhatIsMissingIsNamed) {
+TEST_F(BadRecord, WhatIsMissingIsNamed) {
   const std::string none = postgres_.url("no_such_database");
   const auto no_database = Store::open(none);
   ASSERT_FALSE(no_database);
@@ -115,7 +109,7 @@ TEST_F(BadRecordOfOneServer, WhatIsMissingIsNamed) {
   EXPECT_NE(no_rights.error().message.find("permission denied"), std::string::npos) << sentence(no_rights.error());
 }
 
-TEST_F(BadRecordOfOneServer, ADatabaseThatMayNotBeWrittenIsServedFromItsCopies) {
+TEST_F(BadRecord, ADatabaseThatMayNotBeWrittenIsServedFromItsCopies) {
   {
     const auto store = open(url_);
     ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell_, 1), 0, true, "made"));
@@ -135,7 +129,7 @@ TEST_F(BadRecordOfOneServer, ADatabaseThatMayNotBeWrittenIsServedFromItsCopies) 
   EXPECT_TRUE(store->add_batch(batch("lt-07"), job_of("lt-07")));
 }
 
-TEST_F(BadRecordOfOneServer, AConnectionThatIsCutWithinATransactionLeavesNothingHalfDone) {
+TEST_F(BadRecord, AConnectionThatIsCutWithinATransactionLeavesNothingHalfDone) {
   const auto store = open(url_);
   test::Process somebody({"/usr/bin/psql", url_, "-c", "BEGIN", "-c", "LOCK TABLE audit_end IN EXCLUSIVE MODE", "-c",
                           "SELECT 'locked'", "-c", "SELECT pg_sleep(60)"});
@@ -156,7 +150,7 @@ TEST_F(BadRecordOfOneServer, AConnectionThatIsCutWithinATransactionLeavesNothing
   EXPECT_FALSE(demand(store->audit()).broken);
 }
 
-TEST_F(BadRecordOfOneServer, FiveThousandModelsAreListed) {
+TEST_F(BadRecord, FiveThousandModelsAreListed) {
   const auto store = open(url_);
   ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell_, 1), 0, true, "made"));
   say("INSERT INTO models (cell, version, id, hash, level, batch_id, created_at, training_poses, validation_rms, content) "
@@ -170,7 +164,7 @@ TEST_F(BadRecordOfOneServer, FiveThousandModelsAreListed) {
   EXPECT_EQ(demand(store->add_model("cell-7", test::nominal_model(cell_, 2), 0, false, "made")), 5001);
 }
 
-TEST_F(BadRecordOfOneServer, APoolerThatSharesConnectionsByTransactionMayStandBetween) {
+TEST_F(BadRecord, APoolerThatSharesConnectionsByTransactionMayStandBetween) {
   const test::Pooler pooler(postgres_);
   const std::string empty = postgres_.new_database();
   ASSERT_TRUE(init_store(pooler.through(empty))) << "a store is made through it, too";
@@ -202,7 +196,7 @@ TEST_F(BadRecordOfOneServer, APoolerThatSharesConnectionsByTransactionMayStandBe
   EXPECT_EQ(demand(other->version_in_force("cell-7")), 2);
 }
 
-TEST_F(BadRecordOfOneServer, ProgramsOfTwoBuildsWorkOnOneSchema) {
+TEST_F(BadRecord, ProgramsOfTwoBuildsWorkOnOneSchema) {
   const auto old = open(url_);
   ASSERT_TRUE(old->add_model("cell-7", test::nominal_model(cell_, 1), 0, true, "made"));
   // What a newer program's `store init` adds while older ones go on: it says from which schema on programs may.
@@ -228,12 +222,12 @@ TEST_F(BadRecordOfOneServer, ProgramsOfTwoBuildsWorkOnOneSchema) {
   EXPECT_EQ(too_old.error().next, "start a newer one");
 }
 
-TEST_F(BadRecord, AStandbyThatTakesNoChangesIsNamed) {
+TEST(BadRecordServer, AStandbyThatTakesNoChangesIsNamed) {
   Postgres postgres;
   const std::string url = postgres.new_store();
   postgres.become_standby();
   EXPECT_NE(check_store(url).error().message.find("read-only standby"), std::string::npos);
-  const auto store = open(url);
+  const auto store = demand(Store::open(url));
   const auto refused = store->add_batch(batch("lt-07"), job_of("lt-07"));
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kBusy);
@@ -241,9 +235,9 @@ TEST_F(BadRecord, AStandbyThatTakesNoChangesIsNamed) {
   EXPECT_TRUE(look_through_store(url)) << "it can be looked at";
 }
 
-TEST_F(BadRecord, ADiskOfTheDatabaseThatIsFullStopsChangesUntilThereIsRoom) {
+TEST(BadRecordServer, ADiskOfTheDatabaseThatIsFullStopsChangesUntilThereIsRoom) {
   Postgres postgres(Postgres::Disk::kSmall);
-  const auto store = open(postgres.new_store("TABLESPACE small"));
+  const auto store = demand(Store::open(postgres.new_store("TABLESPACE small")));
   std::mt19937_64 random(1);
   std::string bytes(3'000'000, '\0');  // not to be compressed
   std::set<std::string> acknowledged;

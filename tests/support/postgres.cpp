@@ -65,6 +65,7 @@ Postgres::Postgres(Disk disk) : disk_(disk) {
   if (made.exit_code != 0) give_up(made.err);
   folder_.write("data/pg_hba.conf", "local all needs_password scram-sha-256\nlocal all all trust\n");
   start();
+  sql(url("postgres"), "CREATE ROLE needs_password LOGIN PASSWORD 'right'");
   if (disk_ == Disk::kSmall)
     sql(url("postgres"), fmt::format("CREATE TABLESPACE small LOCATION '{}/space'", small_disk()));
   sql(url("postgres"), "CREATE DATABASE template_store");

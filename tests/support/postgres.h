@@ -24,7 +24,7 @@ class Postgres {
   /// The URL of a new database: an empty one, or one that is a store already.
   [[nodiscard]] std::string new_database();
   [[nodiscard]] std::string new_store(const std::string& more = "");
-  /// Of a database, for a role. The role `needs_password` is let in with one only.
+  /// Of a database, for a role. The role `needs_password` is let in with one only, `right`.
   [[nodiscard]] std::string url(const std::string& database, const std::string& role = "postgres") const;
   /// What a statement says in that database, a line a row; aborts where it fails.
   std::string sql(const std::string& url, const std::string& statement) const;
