@@ -160,6 +160,8 @@ constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
     {"store",
      "  trammel store init postgresql://owner@db-1/trammel --grant trammel\n"
      "  trammel store copy data/trammel.db postgresql://owner@db-1/trammel\n"
+     "  trammel store copy --keep-source postgresql://owner@db-1/trammel monday.db\n"
+     "  trammel store reopen data/trammel.db\n"
      "  trammel store check data/trammel.db"},
     {"help", "  trammel help\n  trammel help formats\n  trammel help train"},
     {"doctor", "  trammel doctor\n  trammel doctor --port 17501 --store data/trammel.db --json -"},
