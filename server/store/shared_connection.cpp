@@ -97,7 +97,10 @@ void SharedConnection::give_back(Connected connected) {
   {
     const MutexLock guard(mutex_);
     if (lent_ > 0) --lent_;
-    if (connected && connected->is_lost()) idle_.clear();  // what killed one has killed all
+    if (connected && connected->is_lost()) {  // what killed one has killed all
+      idle_.clear();
+      listener_may_be_lost_ = true;  // a host that is frozen does not say so
+    }
     if (connected && !connected->is_lost()) idle_.push_back(std::move(connected));
   }
   given_back_.notify_one();
@@ -178,6 +181,7 @@ std::string SharedConnection::who_holds() {
 bool SharedConnection::hears_of_change(const std::stop_token& stop, Clock::time_point until) {
   constexpr std::chrono::milliseconds kSlice{200};  // until it is seen that it is to stop
   try {
+    if (listener_may_be_lost_.exchange(false)) listener_.reset();
     if (!listener_) {
       auto connected = connect();
       if (!connected) return false;

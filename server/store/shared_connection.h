@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <memory>
 #include <string>
@@ -50,6 +51,7 @@ class SharedConnection final : public StoreConnection {
   std::vector<Connected> idle_ TRAMMEL_GUARDED_BY(mutex_);
   std::size_t lent_ TRAMMEL_GUARDED_BY(mutex_) = 0;
   Connected listener_;  // of the one thread that waits for changes
+  std::atomic<bool> listener_may_be_lost_ = false;
 };
 
 }  // namespace trammel

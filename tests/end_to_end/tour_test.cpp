@@ -92,6 +92,8 @@ void end_what_runs_in(const std::filesystem::path& folder) {
     const auto at = std::filesystem::read_symlink("/proc/" + std::to_string(pid) + "/cwd", gone);
     if (pid > 1 && !gone && at == folder) ::kill(pid, SIGKILL);
   }
+  if (const std::string database = (folder / "db").string(); std::filesystem::exists(database))
+    static_cast<void>(test::run({TRAMMEL_SOURCE_DIR "/deploy/database", "remove", database}));
 }
 
 class Tour : public testing::TestWithParam<const char*> {};

@@ -27,7 +27,7 @@ constexpr const char* kLimits =
     "SET LOCAL statement_timeout = '5s'; SET LOCAL lock_timeout = '2s'; "
     "SET LOCAL idle_in_transaction_session_timeout = '10s'";
 
-constexpr std::string_view kWarning = "01000";
+constexpr std::string_view kWarning = "01000", kReadOnly = "25006";
 
 /// OIDs of the types that the store has (pg_type.dat).
 constexpr Oid kBool = 16, kInt8 = 20, kInt2 = 21, kInt4 = 23, kFloat8 = 701;
@@ -283,8 +283,10 @@ PostgresDatabase::Answer PostgresDatabase::answer(Deadline deadline) {
   }
   if (!last || ::PQstatus(connection) == CONNECTION_BAD) lose(first_line(::PQerrorMessage(connection)));
   const auto status = ::PQresultStatus(last.get());
-  if (status != PGRES_COMMAND_OK && status != PGRES_TUPLES_OK) throw error_of(last.get());
-  return last;
+  if (status == PGRES_COMMAND_OK || status == PGRES_TUPLES_OK) return last;
+  const char* code = ::PQresultErrorField(last.get(), PG_DIAG_SQLSTATE);
+  if (code != nullptr && std::string_view(code) == kReadOnly) lost_ = true;  // another host takes changes now
+  throw error_of(last.get());
 }
 
 PostgresDatabase::Answer PostgresDatabase::ask(const char* sql, Values values) {
