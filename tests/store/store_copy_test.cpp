@@ -131,13 +131,9 @@ TEST_F(StoreCopyTest, WhatAServiceChangesWhileItsDatabaseIsMovedIsInTheCopyOrRef
   static_cast<void>(demand(copy_store(file_, url_, kKept)));
   const auto served = demand(Store::open(url_));
   Result<StoredJob> meanwhile = tl::make_unexpected(Error{});
-  const std::string csv = "q1_deg\n1\n";
-  StoredJob job;
-  job.cell = "cell-7";
-  job.batch_ids = {"lt-08"};
   const auto moved = copy_store(url_, back_, SourceAfter::kMoved, [&](double) {
     if (meanwhile || !meanwhile.error().message.empty()) return;  // once, with the first row
-    meanwhile = served->add_batch({"cell-7", "lt-08", csv, sha256_hex(csv), "client:2", 1700000000, 1}, job);
+    meanwhile = served->add_batch(test::batch_of("lt-08"), test::job_of("lt-08"));
   });
   ASSERT_TRUE(moved) << sentence(moved.error());
   EXPECT_FALSE(meanwhile) << "the store does not change while it is read";
