@@ -100,7 +100,8 @@ CommitSettings commit_settings(Database& database) {
 
 std::string missing_watchdog(const std::string& proc, const std::string& sys) {
   if (!any_is(proc, "comm", "patroni") || any_is(fs::path(sys) / "class/watchdog", "state", "active")) return "";
-  return "Patroni runs on this host without a watchdog: a primary that hangs and wakes is ended by nobody; load softdog "
+  return "Patroni runs on this host without a watchdog: a primary that hangs and wakes is ended by nobody; load "
+         "softdog "
          "or the hardware's driver, and set watchdog: {mode: required} (deploy/patroni/README.md)";
 }
 

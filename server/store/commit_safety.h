@@ -11,9 +11,9 @@ namespace trammel {
 struct CommitSettings {
   bool fsync = true;
   std::string synchronous_commit = "on";
-  std::string standby_names;          ///< synchronous_standby_names
-  bool standbys_are_seen = true;      ///< false: this role may not see them
-  int standbys = 0;                   ///< that stream
+  std::string standby_names;            ///< synchronous_standby_names
+  bool standbys_are_seen = true;        ///< false: this role may not see them
+  int standbys = 0;                     ///< that stream
   std::vector<std::string> waited_for;  ///< those of them that a commit waits for, or may
 };
 

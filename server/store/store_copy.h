@@ -33,9 +33,9 @@ enum class SourceAfter {
 };
 
 /// Copies a store, a file or database, to another, with all that was ever in it: the same versions, the same trail, the
-/// same identity. It is verified table by table before it counts. The trail of the new one then says where it came from.
-/// A file must not be served meanwhile; of a database that is moved the services change nothing meanwhile, and nothing
-/// afterwards. Refuses a target that is not empty. `progress`: the share that is done.
+/// same identity. It is verified table by table before it counts. The trail of the new one then says where it came
+/// from. A file must not be served meanwhile; of a database that is moved the services change nothing meanwhile, and
+/// nothing afterwards. Refuses a target that is not empty. `progress`: the share that is done.
 [[nodiscard]] Result<StoreContent> copy_store(const std::string& from, const std::string& to, SourceAfter source,
                                               const std::function<void(double)>& progress = nullptr);
 

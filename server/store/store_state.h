@@ -15,8 +15,8 @@ struct RecordState {
   std::string place;  ///< a file, or a URL without password and options
   bool reachable = true;
   std::optional<std::int64_t> away_since = {};  ///< Unix time, s
-  std::string survives;  ///< what a change that was acknowledged survives; empty: not known now
-  std::string worry;     ///< what of that is not as it should be, and what to do about it; empty: nothing
+  std::string survives;                         ///< what a change that was acknowledged survives; empty: not known now
+  std::string worry;  ///< what of that is not as it should be, and what to do about it; empty: nothing
 };
 
 /// What the disk lets a store do.

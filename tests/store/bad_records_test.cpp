@@ -142,7 +142,8 @@ TEST_F(BadRecord, AConnectionThatIsCutWithinATransactionLeavesNothingHalfDone) {
 TEST_F(BadRecord, FiveThousandModelsAreListed) {
   const auto store = open(url_);
   ASSERT_TRUE(store->add_model("cell-7", test::nominal_model(cell_, 1), 0, true, "made"));
-  say("INSERT INTO models (cell, version, id, hash, level, batch_id, created_at, training_poses, validation_rms, content) "
+  say("INSERT INTO models (cell, version, id, hash, level, batch_id, created_at, training_poses, validation_rms, "
+      "content) "
       "SELECT cell, n, id || n, hash || n, level, batch_id, created_at, training_poses, validation_rms, content "
       "FROM models, generate_series(2, 5000) AS n");
   say("UPDATE cells SET last_version = 5000");

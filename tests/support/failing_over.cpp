@@ -32,8 +32,8 @@ FailingOver::FailingOver() {
   start(trains, "serves: false\n");
   const auto session = demand(client::Session::open(session_options()));
   for (const std::uint64_t seed : {1, 2}) {
-    const auto job = demand(
-        session->submit_measurements("cell-7", fmt::format("learned-{}", seed), virtual_batch_csv(60, seed)));
+    const auto job =
+        demand(session->submit_measurements("cell-7", fmt::format("learned-{}", seed), virtual_batch_csv(60, seed)));
     static_cast<void>(demand(session->wait_for_job(job, kLimit, nullptr)));
   }
   trains.kill();

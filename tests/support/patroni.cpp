@@ -30,8 +30,8 @@ Patroni::Patroni() {
     return;
   }
   // TERM: it ends what it has started. Killed with this process it could not.
-  cluster_.emplace(std::vector<std::string>{"/usr/bin/setpriv", "--pdeathsig=TERM", kScript, "run",
-                                            folder_.path().string()});
+  cluster_.emplace(
+      std::vector<std::string>{"/usr/bin/setpriv", "--pdeathsig=TERM", kScript, "run", folder_.path().string()});
   if (!cluster_->wait_for_line("ready: ", kPatience)) why_not_ = cluster_->standard_error();
 }
 
@@ -55,9 +55,9 @@ Finished Patroni::ask(const std::string& what, const std::string& more) const {
 }
 
 std::string Patroni::sql(const std::string& statement) const {
-  const Finished said = run({"/usr/bin/psql", url("postgres", "trammel") + "&connect_timeout=2", "-v",
-                             "ON_ERROR_STOP=1", "-qAtc", statement},
-                            kPatience);
+  const Finished said = run(
+      {"/usr/bin/psql", url("postgres", "trammel") + "&connect_timeout=2", "-v", "ON_ERROR_STOP=1", "-qAtc", statement},
+      kPatience);
   if (said.exit_code == 0) return said.out;
   fmt::print(stderr, "{}\n", said.err);
   std::abort();

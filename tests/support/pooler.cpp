@@ -26,8 +26,8 @@ Pooler::Pooler(const Postgres& server) {
   std::vector<std::string> command = {"/usr/sbin/pgbouncer", file};
   if (::geteuid() == 0) {  // it refuses to run as root
     static_cast<void>(run({"/bin/chown", "-R", "postgres", folder_.path().string()}));
-    command.insert(command.begin(), {"/usr/bin/setpriv", "--reuid=postgres", "--regid=postgres", "--init-groups",
-                                     "--pdeathsig=KILL"});
+    command.insert(command.begin(),
+                   {"/usr/bin/setpriv", "--reuid=postgres", "--regid=postgres", "--init-groups", "--pdeathsig=KILL"});
   }
   pooler_.emplace(command);
   if (pooler_->wait_for_line("process up", kPatience)) return;

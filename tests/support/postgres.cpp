@@ -96,9 +96,7 @@ void Postgres::become_standby() {
   start_until("ready to accept read-only connections");
 }
 
-void Postgres::make_room() const {
-  fs::remove(fmt::format("/proc/{}/root{}/ballast", server_->pid(), small_disk()));
-}
+void Postgres::make_room() const { fs::remove(fmt::format("/proc/{}/root{}/ballast", server_->pid(), small_disk())); }
 
 void Postgres::stop() {
   if (!server_) return;

@@ -204,7 +204,8 @@ void look_at_record(const std::string& url, std::vector<Found>& found) {
                      "an acknowledged change survives " + record.survives, record.worry});
   }
   if (const std::string missing = missing_watchdog(); !missing.empty())
-    found.push_back({"watchdog", State::kNote, missing.substr(0, missing.find("; ")), missing.substr(missing.find("; ") + 2)});
+    found.push_back(
+        {"watchdog", State::kNote, missing.substr(0, missing.find("; ")), missing.substr(missing.find("; ") + 2)});
 }
 
 void look_at_store(const std::string& path, std::vector<Found>& found) {
@@ -284,7 +285,8 @@ void add_doctor_command(CLI::App& app, Action& chosen) {
   arguments->service.timeout_s = 2;
   CLI::App* command = app.add_subcommand(
       "doctor", "Look at this machine for what keeps a service from working, and say what to do about it");
-  command->add_option("--store", arguments->store, "A server's store (its key store), a file or a URL, to look at it, too")
+  command
+      ->add_option("--store", arguments->store, "A server's store (its key store), a file or a URL, to look at it, too")
       ->type_name("STORE");
   add_json_option(*command, arguments->json);
   add_options_of_service_command(*command, arguments->service);

@@ -57,8 +57,7 @@ Status check(const StoreArguments& arguments) {
 
 Status copy(const StoreArguments& arguments) {
   ProgressLine line;
-  return say(copy_store(arguments.place, arguments.to,
-                        arguments.keep_source ? SourceAfter::kKept : SourceAfter::kMoved,
+  return say(copy_store(arguments.place, arguments.to, arguments.keep_source ? SourceAfter::kKept : SourceAfter::kMoved,
                         [&line](double share) { line.show("copying", share); }),
              arguments.to, arguments);
 }

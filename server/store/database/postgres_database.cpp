@@ -22,7 +22,7 @@ constexpr milliseconds kPerHost{1000};  // to connect to one
 constexpr milliseconds kAnswer{6000};   // longer than the server's own limit below
 constexpr milliseconds kCommit{10000};  // it may wait for a standby
 constexpr milliseconds kLongWork{600000};
-constexpr int kOldestServer = 130000;   // gen_random_uuid()
+constexpr int kOldestServer = 130000;  // gen_random_uuid()
 constexpr const char* kLimits =
     "SET LOCAL statement_timeout = '5s'; SET LOCAL lock_timeout = '2s'; "
     "SET LOCAL idle_in_transaction_session_timeout = '10s'";
@@ -170,9 +170,9 @@ bool is_refused_for_good(PGconn* connection, const std::string& told) {
   if (at == std::string::npos) return false;
   const auto says = [why = told.substr(at)](const char* what) { return why.find(what) != std::string::npos; };
   // The last four are a pooler's, whose server is away.
-  constexpr std::array kForNow = {"starting up",  "not yet accepting", "shutting down",      "recovery",      "too many",
-                                  "slots",        "server login",      "query_wait_timeout", "cannot connect",
-                                  "connect failed"};
+  constexpr std::array kForNow = {
+      "starting up", "not yet accepting", "shutting down",      "recovery",       "too many",
+      "slots",       "server login",      "query_wait_timeout", "cannot connect", "connect failed"};
   return std::none_of(kForNow.begin(), kForNow.end(), says);
 }
 
