@@ -12,6 +12,7 @@
 #include "server/bias/choose_bias.h"
 #include "server/calibrate/calibration.h"
 #include "server/calibrate/changes.h"
+#include "server/compensate/budget/budget.h"
 #include "server/compensate/evaluation.h"
 #include "server/compensate/what_was_measured.h"
 
@@ -94,6 +95,7 @@ struct ModelParts {
   ModelProvenance provenance;                                  ///< id and hash are filled in by make()
   Evaluation training;                                         ///< on its training poses
   std::optional<Evaluation> validation;                        ///< on poses held out from training
+  std::optional<ErrorBudget> budget;  ///< at the training poses; empty where none has a position
 };
 
 }  // namespace trammel

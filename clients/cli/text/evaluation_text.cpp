@@ -5,10 +5,12 @@
 #include "clients/cli/text/notes_text.h"
 #include "server/base/coverage.h"
 #include "server/base/units.h"
+#include "server/compensate/budget/budget_words.h"
 #include "server/compensate/model_notes.h"
 #include "server/compensate/residual_structure.h"
 #include "server/error_sources/cause_words.h"
 #include "server/measurement/files/csv_table.h"
+#include "server/report/budget_json.h"
 #include "server/report/figures_json.h"
 #include "server/report/measured_json.h"
 #include "server/report/note_json.h"
@@ -262,6 +264,14 @@ std::string suspects_text(const std::vector<SuspectPose>& suspects) {
   return text;
 }
 
+/// Where the millimetres come from.
+std::string budget_text(const ModelParts& parts) {
+  if (!parts.budget) return "";
+  std::string text;
+  for (const std::string& line : in_words(*parts.budget)) text += (text.empty() ? "" : "  ") + line + "\n";
+  return text;
+}
+
 }  // namespace
 
 std::string model_text(const CompensatedModel& model) {
@@ -270,7 +280,7 @@ std::string model_text(const CompensatedModel& model) {
   std::string text = notes_text(grave(notes)) + provenance_text(model) + notes_text(for_information(notes));
   text += rotation_text(parts) + negative_play_text(parts);
   if (parts.bias_choice) text += choice_text(*parts.bias_choice);
-  return text + unidentifiable_text(parts.unidentifiable) + suspects_text(parts.suspects);
+  return text + budget_text(parts) + unidentifiable_text(parts.unidentifiable) + suspects_text(parts.suspects);
 }
 
 namespace {
@@ -384,6 +394,7 @@ ordered_json model_json(const CompensatedModel& model) {
   json["not_identifiable"] = unidentifiable_json(parts.unidentifiable);
   json["measured"] = measured_json(model);
   json["training"] = evaluation_json(parts.training);
+  json["budget"] = parts.budget ? budget_json(*parts.budget) : ordered_json(nullptr);
   json["notes"] = notes_json(notes_of(model));
   if (!parts.sessions.empty()) json["sessions"] = sessions_json(parts);
   if (!parts.sessions.empty()) json["order_of_sessions"] = parts.sessions_as_given ? "as_given" : "by_time";

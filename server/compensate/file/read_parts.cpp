@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "server/bias/kernels/kernel_spelling.h"
+#include "server/compensate/file/budget_values.h"
 #include "server/compensate/file/json_values.h"
 #include "server/compensate/file/keys.h"
 
@@ -357,6 +358,7 @@ Result<ModelParts> parts_from(const Json& content, const Json& stamp, const std:
   if (const Status read = read_bias(content, where, parts); !read) return tl::make_unexpected(read.error());
   if (const Status same = check_angles(content, where, parts); !same) return tl::make_unexpected(same.error());
   if (content.contains("validation")) parts.validation = evaluation_from(content.at("validation"));
+  if (content.contains("budget")) parts.budget = budget_from(content.at("budget"));
   parts.provenance = provenance_from(content.at("provenance"), stamp);
   return parts;
 }

@@ -1,6 +1,7 @@
 #include "server/compensate/file/write_parts.h"
 
 #include "server/base/hash.h"
+#include "server/compensate/file/budget_values.h"
 #include "server/compensate/file/json_values.h"
 #include "server/compensate/file/keys.h"
 
@@ -253,6 +254,7 @@ Json content_of(const ModelParts& parts) {
   add_bias(parts, content);
   content["training"] = json_of(parts.training);
   if (parts.validation) content["validation"] = json_of(*parts.validation);
+  if (parts.budget) content["budget"] = budget_json(*parts.budget);
   content["provenance"] = json_of(parts.provenance);
   return content;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/compensate/budget/error_budget.h"
 #include "server/calibrate/agreement.h"
 #include "server/calibrate/batch_check.h"
 #include "server/calibrate/calibrate_with_maps.h"
@@ -96,6 +97,8 @@ Result<CompensatedModel> validated(CompensatedModel::Parts parts, const BatchSpl
   const Result<CompensatedModel> bare = CompensatedModel::make(parts);
   if (!bare) return bare;
   parts.training = bare->evaluate(split.train);
+  parts.budget.reset();
+  if (has_positions(split.train)) parts.budget = error_budget(*bare, split.train);
   parts.validation.reset();
   if (!split.validation.measurements.empty()) parts.validation = bare->evaluate(split.validation);
   return CompensatedModel::make(std::move(parts));

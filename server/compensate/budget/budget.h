@@ -1,0 +1,76 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+/// Where the millimetres come from: the error of an arm, from its drawing to what is left, a line for each thing that a
+/// person can point at. server/compensate/budget/README.md derives the arithmetic.
+namespace trammel {
+
+/// What a line of the budget is.
+enum class LineKind {
+  kBase,
+  kJointZero,
+  kLength,
+  kTwist,
+  kTool,
+  kJointCompliance,
+  kCause,       ///< a further cause of the catalogue
+  kLearned,     ///< the bias
+  kTogether,    ///< what the lines do together beyond what each does alone
+  kUntold,      ///< what these poses cannot tell
+  kRest,        ///< what the model leaves, beyond the noise of the instrument
+  kInstrument,  ///< the stated noise of the instrument
+};
+/// As JSON and the wire spell it: `joint_zero`.
+[[nodiscard]] std::string_view to_string(LineKind kind);
+/// Its inverse; empty: no kind is spelled so.
+[[nodiscard]] std::optional<LineKind> line_kind(std::string_view spelled);
+
+/// A number of a line, in the unit that people read.
+struct BudgetNumber {
+  std::string name;  ///< as the model has it: `q4`
+  double value = 0;
+  double u95 = 0;  ///< U(k = 2)
+  std::string unit;
+};
+
+/// One thing that a person can point at.
+struct BudgetLine {
+  std::string line;  ///< `zero:4`, `length:a2`, `twist:alpha3`, `base`, `tool`, `compliance:2`, else as in a cell file
+  LineKind kind = LineKind::kCause;
+  std::string cause;                     ///< of a kCause, its spelling: `gear_transmission`
+  int joint = -1;                        ///< 0-based; -1: of no single joint
+  std::string name;                      ///< for people: `the zero of joint 4`
+  std::optional<BudgetNumber> value;     ///< the one number of the line; a distance for a place
+  std::vector<BudgetNumber> numbers;     ///< of a line with several, each of them
+  double alone_rms = 0;                  ///< m, of the poses: what the line does to them
+  double alone_max = 0;                  ///< m
+  double share = 0;                      ///< of the mean square error; may be negative; all lines add to 1
+  double left_if_right = 0;              ///< m rms: what is left of the error if only this line were put right
+  std::optional<double> times_usual;     ///< the value over what arms of this kind show
+  std::vector<std::string> with;         ///< lines that the poses cannot tell from it: they are counted here
+  std::string action;                    ///< what to do; empty: nothing stands out
+  [[nodiscard]] std::string cause_or_kind() const;
+};
+
+/// All lines, the largest share first; `kTogether`, `kUntold`, `kRest` and `kInstrument` stand last.
+struct BudgetView {
+  double error_rms = 0;  ///< m, of the error that the shares are of
+  std::vector<BudgetLine> lines;
+};
+
+/// The error budget of a model at measured poses.
+struct ErrorBudget {
+  int poses = 0;
+  BudgetView as_it_stands;
+  /// The same of what touching base and tool frames would leave: the best fit of both to the error is taken out of it
+  /// and of every line. Lines of frames do not stand here.
+  BudgetView beyond_frames;
+
+  [[nodiscard]] const BudgetLine* line(std::string_view name) const;
+};
+
+}  // namespace trammel

@@ -1,0 +1,67 @@
+#include "server/compensate/budget/budget_words.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/base/units.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr double kAlwaysShown = 0.1;  // of the error: a line beyond the first ones that has more is shown as well
+
+/// Two digits of the uncertainty.
+int decimals_for(double u95) {
+  if (!(u95 > 0)) return 4;
+  return std::clamp(1 - static_cast<int>(std::floor(std::log10(u95))), 0, 6);
+}
+
+std::string value_of(const BudgetNumber& value) {
+  const int digits = decimals_for(value.u95);
+  return fmt::format("{:+.{}f} ± {:.{}f} {}", value.value, digits, value.u95, digits, value.unit);
+}
+
+std::string joined(const std::vector<std::string>& all) { return fmt::format("{}", fmt::join(all, ", ")); }
+
+/// What stands behind the name, in brackets.
+std::string detail(const BudgetLine& line) {
+  std::vector<std::string> parts;
+  if (line.value) parts.push_back(value_of(*line.value));
+  if (!line.with.empty() && line.kind != LineKind::kUntold)
+    parts.push_back("these poses cannot tell it from " + joined(line.with));
+  if (line.times_usual && !line.action.empty()) parts.push_back(fmt::format("{:.0f} times what is usual", *line.times_usual));
+  return parts.empty() ? "" : fmt::format(" ({})", fmt::join(parts, "; "));
+}
+
+}  // namespace
+
+std::string sentence(const BudgetLine& line) {
+  if (line.kind == LineKind::kUntold) return fmt::format("{}: {}", line.name, joined(line.with));
+  std::string text = fmt::format("{}{}: {:.3f} mm alone, {:.0f} %", line.name, detail(line), to_mm(line.alone_rms),
+                                 100 * line.share);
+  if (!line.action.empty()) text += "; " + line.action;
+  return text;
+}
+
+std::vector<std::string> in_words(const ErrorBudget& budget, int most) {
+  if (budget.as_it_stands.lines.empty()) return {};
+  std::vector<std::string> text = {
+      fmt::format("the drawing is off by {:.3f} mm rms at {} poses; touching base and tool frames would leave {:.3f} mm",
+                  to_mm(budget.as_it_stands.error_rms), budget.poses, to_mm(budget.beyond_frames.error_rms))};
+  // What stands out leads.
+  std::vector<const BudgetLine*> lines;
+  for (const BudgetLine& line : budget.as_it_stands.lines) lines.push_back(&line);
+  std::stable_sort(lines.begin(), lines.end(), [](const BudgetLine* one, const BudgetLine* other) {
+    return !one->action.empty() && other->action.empty();
+  });
+  for (const BudgetLine* line : lines) {
+    const bool shown = most-- > 0 || std::abs(line->share) > kAlwaysShown || line->kind == LineKind::kUntold;
+    if (shown) text.push_back(sentence(*line));
+  }
+  return text;
+}
+
+}  // namespace trammel

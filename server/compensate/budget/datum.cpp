@@ -1,0 +1,169 @@
+#include "server/compensate/budget/datum.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "server/compensate/budget/usual.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr double kNothingTold = 0.1;    // of one comparison size: a direction with less is not told by the poses
+constexpr double kPartner = 0.3;        // of the effect: a parameter with more is a partner
+constexpr double kBeyondChance = 3;     // standard deviations
+constexpr int kSteps = 2;               // of Gauss-Newton: the change of the datum is small
+constexpr double kMatched = 1e-7;       // m
+constexpr double kLaterJoint = 1e-6;    // of two equal candidates the later joint counts as being on its drawing
+
+/// What the measurements told of the parameters that were identified, F x F in units of `sizes`: the inverse of the
+/// covariance without what the priors said.
+struct Told {
+  std::vector<Eigen::Index> free;  // places among the model's P
+  Eigen::MatrixXd information;
+};
+
+Told told_by(const Identified& parts, const Eigen::VectorXd& sizes) {
+  Told told;
+  for (Eigen::Index i = 0; i < parts.covariance.rows(); ++i)
+    if (parts.covariance(i, i) > 0) told.free.push_back(i);
+  const auto F = std::ssize(told.free);
+  Eigen::VectorXd prior(F);
+  for (Eigen::Index k = 0; k < F; ++k)
+    prior(k) = parts.parameters[static_cast<std::size_t>(told.free[static_cast<std::size_t>(k)])].parameter.prior_scale;
+  const Eigen::VectorXd inverse = prior.cwiseInverse();
+  const Eigen::MatrixXd scaled =
+      inverse.asDiagonal() * parts.covariance(told.free, told.free) * inverse.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solved(scaled);
+  const Eigen::VectorXd share = solved.eigenvalues().cwiseMax(1e-14);
+  const Eigen::VectorXd beyond_prior = (share.cwiseInverse().array() - 1).max(0);
+  const Eigen::VectorXd to_sizes = sizes(told.free).cwiseQuotient(prior);
+  const Eigen::MatrixXd root = to_sizes.asDiagonal() * solved.eigenvectors();
+  told.information = root * beyond_prior.asDiagonal() * root.transpose();
+  return told;
+}
+
+/// The directions that are not told, as columns (F x R), in units of the sizes.
+Eigen::MatrixXd untold_directions(const Eigen::MatrixXd& information) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solved(information);
+  Eigen::Index count = 0;
+  while (count < information.rows() && solved.eigenvalues()(count) < kNothingTold * kNothingTold) ++count;
+  return solved.eigenvectors().leftCols(count);
+}
+
+/// The R parameters that count as being on their drawing: those with the largest parts in what is not told.
+std::vector<Eigen::Index> chosen(const Eigen::MatrixXd& untold) {
+  Eigen::MatrixXd rows = untold.transpose();
+  for (Eigen::Index k = 0; k < rows.cols(); ++k) rows.col(k) *= 1 + kLaterJoint * static_cast<double>(k);
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> pivots(rows);
+  std::vector<Eigen::Index> all;
+  for (Eigen::Index k = 0; k < untold.cols(); ++k) all.push_back(pivots.colsPermutation().indices()(k));
+  return all;
+}
+
+/// 3N x P, m by the SI parameters, of the positions in W.
+Eigen::MatrixXd jacobian_of(const PhysicalModel& model, const std::vector<PoseContext>& poses) {
+  Eigen::MatrixXd all(3 * std::ssize(poses), model.parameter_count());
+  Eigen::MatrixXd J;
+  Eigen::Index row = 0;
+  for (const PoseContext& pose : poses) {
+    model.pose_W(pose, model.values, &J);
+    all.middleRows(row, 3) = J.topRows(3);
+    row += 3;
+  }
+  return all;
+}
+
+Eigen::VectorXd positions_of(const PhysicalModel& model, const std::vector<PoseContext>& poses) {
+  Eigen::VectorXd all(3 * std::ssize(poses));
+  Eigen::Index row = 0;
+  for (const PoseContext& pose : poses) {
+    all.segment<3>(row) = model.pose_W(pose).translation();
+    row += 3;
+  }
+  return all;
+}
+
+/// Moves the parameters `kept` until the model predicts `wanted` (3N, m).
+void match(PhysicalModel& model, const std::vector<Eigen::Index>& kept, const Eigen::VectorXd& sizes,
+           const Eigen::VectorXd& wanted, const std::vector<PoseContext>& poses) {
+  const Eigen::VectorXd scale = sizes(kept);
+  for (int step = 0; step < kSteps; ++step) {
+    const Eigen::VectorXd missing = wanted - positions_of(model, poses);
+    if (missing.cwiseAbs().maxCoeff() < kMatched) return;
+    const Eigen::MatrixXd J = jacobian_of(model, poses)(Eigen::all, kept) * scale.asDiagonal();
+    Eigen::MatrixXd normal = J.transpose() * J;
+    normal.diagonal().array() += kMatched * kMatched;
+    model.values(kept) += scale.cwiseProduct(normal.ldlt().solve(J.transpose() * missing));
+  }
+}
+
+/// Draws what the measurements hardly tell towards the drawing, as far as it is not beyond chance, and sets the
+/// covariance of what is kept.
+void settle(Datum& datum, const std::vector<Eigen::Index>& kept, const Eigen::VectorXd& sizes,
+            const Eigen::MatrixXd& information) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solved(information);
+  const Eigen::VectorXd scale = sizes(kept);
+  Eigen::VectorXd along = solved.eigenvectors().transpose() * datum.model.values(kept).cwiseQuotient(scale);
+  Eigen::VectorXd variance(along.size());
+  for (Eigen::Index k = 0; k < along.size(); ++k) {
+    const double told = std::max(solved.eigenvalues()(k), 0.0);
+    const bool beyond_chance = std::sqrt(told) * std::abs(along(k)) > kBeyondChance;
+    if (!beyond_chance) along(k) *= told / (told + 1);
+    variance(k) = 1 / (beyond_chance ? told : told + 1);
+  }
+  datum.model.values(kept) = scale.cwiseProduct(solved.eigenvectors() * along);
+  const Eigen::MatrixXd root = scale.asDiagonal() * solved.eigenvectors();
+  datum.covariance(kept, kept) = root * variance.asDiagonal() * root.transpose();
+}
+
+/// Which parameters make the same effect as `untold` (a direction of all P, SI), with the one that it is named after.
+std::vector<Eigen::Index> partners(const Eigen::VectorXd& untold, Eigen::Index named,
+                                   const std::vector<Eigen::Index>& not_among, const Eigen::VectorXd& effect) {
+  std::vector<Eigen::Index> all;
+  const double own = std::abs(untold(named)) * effect(named);
+  for (Eigen::Index i = 0; i < untold.size(); ++i) {
+    const bool other = std::find(not_among.begin(), not_among.end(), i) == not_among.end();
+    if (other && own > 0 && std::abs(untold(i)) * effect(i) > kPartner * own) all.push_back(i);
+  }
+  return all;
+}
+
+}  // namespace
+
+Datum datum_of(const Identified& found, const std::vector<PoseContext>& poses) {
+  const PhysicalModel& physics = found.physics;
+  const Eigen::VectorXd sizes = sizes_to_compare_by(physics);
+  Datum datum{physics, Eigen::MatrixXd::Zero(physics.parameter_count(), physics.parameter_count()), {}};
+  const Told told = told_by(found, sizes);
+  if (told.free.empty()) return datum;
+  const Eigen::MatrixXd untold = untold_directions(told.information);
+  const std::vector<Eigen::Index> gone = chosen(untold);
+  std::vector<Eigen::Index> kept_of_free, kept, on_drawing;
+  for (Eigen::Index k = 0; k < std::ssize(told.free); ++k) {
+    const bool is_gone = std::find(gone.begin(), gone.end(), k) != gone.end();
+    (is_gone ? on_drawing : kept).push_back(told.free[static_cast<std::size_t>(k)]);
+    if (!is_gone) kept_of_free.push_back(k);
+  }
+  if (!gone.empty()) {
+    // Along what is not told the poses stay as they are, to first order: the chosen parameters go to their drawing.
+    Eigen::MatrixXd of_gone(std::ssize(gone), untold.cols());
+    for (Eigen::Index r = 0; r < of_gone.rows(); ++r) of_gone.row(r) = untold.row(gone[static_cast<std::size_t>(r)]);
+    const Eigen::MatrixXd by_each = untold * of_gone.inverse();  // F x R: each moves one chosen parameter by its size
+    const Eigen::VectorXd effect = jacobian_of(physics, poses).colwise().norm();
+    for (std::size_t r = 0; r < gone.size(); ++r) {
+      const Eigen::Index parameter = told.free[static_cast<std::size_t>(gone[r])];
+      Eigen::VectorXd direction = Eigen::VectorXd::Zero(sizes.size());
+      direction(told.free) = by_each.col(static_cast<Eigen::Index>(r)).cwiseProduct(sizes(told.free));
+      datum.model.values -= direction * (physics.values(parameter) / direction(parameter));
+      datum.on_drawing.push_back({parameter, partners(direction, parameter, on_drawing, effect)});
+    }
+    for (const Eigen::Index parameter : on_drawing) datum.model.values(parameter) = 0;
+    match(datum.model, kept, sizes, positions_of(physics, poses), poses);
+  }
+  settle(datum, kept, sizes, told.information(kept_of_free, kept_of_free));
+  return datum;
+}
+
+}  // namespace trammel

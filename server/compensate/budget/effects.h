@@ -1,0 +1,36 @@
+#pragma once
+
+#include <vector>
+
+#include "server/compensate/budget/datum.h"
+#include "server/compensate/budget/items.h"
+
+/// Inside of the room: what each line does to the poses, as vectors.
+namespace trammel {
+
+/// 3 x N each, m, in W. `total` = the sum of all others, exactly.
+struct Effects {
+  Eigen::Matrix3Xd total;               ///< measured minus the drawing
+  std::vector<Eigen::Matrix3Xd> lines;  ///< of each item: the model minus the model without it
+  Eigen::Matrix3Xd learned;             ///< of the bias
+  Eigen::Matrix3Xd rest;                ///< measured minus compensated
+  Eigen::Matrix3Xd together;            ///< what is then missing: lines that act on one another
+};
+/// Measured minus predicted, 3 x N, m, in W: by the drawing, by the physics as identified, and with the bias.
+struct LeftAt {
+  Eigen::Matrix3Xd drawing, physics, all;
+};
+[[nodiscard]] Effects effects_of(const LeftAt& left, const Datum& datum, const std::vector<BudgetItem>& items,
+                                 const MeasurementBatch& positions);
+
+/// Takes out of 3 x N vectors at poses what a small motion of the base and of each tool could do.
+class BeyondFrames {
+ public:
+  BeyondFrames(const PhysicalModel& model, const MeasurementBatch& positions);
+  [[nodiscard]] Eigen::Matrix3Xd operator()(const Eigen::Matrix3Xd& vectors) const;
+
+ private:
+  Eigen::MatrixXd basis_;  // 3N x K, orthonormal
+};
+
+}  // namespace trammel

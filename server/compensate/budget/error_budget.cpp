@@ -1,0 +1,244 @@
+#include "server/compensate/budget/error_budget.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <set>
+
+#include "server/base/units.h"
+#include "server/compensate/budget/effects.h"
+#include "server/compensate/budget/usual.h"
+#include "server/measurement/gauges.h"
+
+namespace trammel {
+
+namespace {
+
+double mean_square(const Eigen::Matrix3Xd& vectors) {
+  return vectors.squaredNorm() / static_cast<double>(vectors.cols());
+}
+
+double inner(const Eigen::Matrix3Xd& one, const Eigen::Matrix3Xd& other) {
+  return one.cwiseProduct(other).sum() / static_cast<double>(one.cols());
+}
+
+/// An angle as people read it; other numbers in their own unit.
+struct Shown {
+  double scale = 1;
+  std::string unit;
+};
+Shown shown(const Parameter& parameter) {
+  if (parameter.unit == "rad") return {to_deg(1.0), "deg"};
+  return {parameter.scale, parameter.unit};
+}
+
+double u95(double variance) { return 2 * std::sqrt(std::max(variance, 0.0)); }
+
+/// A joint's zero is told as the controller counts: the joint stands at the angle shown plus this.
+double counted(const BudgetItem& item, const Chain& robot) {
+  return item.line.kind == LineKind::kJointZero ? robot.joint(item.line.joint).sign : 1.0;
+}
+
+/// The values of the parameters of a line.
+void add_values(const Datum& datum, const std::vector<Parameter>& parameters, BudgetItem& item) {
+  BudgetLine& line = item.line;
+  for (const Eigen::Index place : item.places) {
+    const Parameter& parameter = parameters[static_cast<std::size_t>(place)];
+    const auto [scale, unit] = shown(parameter);
+    const double sign = counted(item, datum.model.cell->robot);
+    line.numbers.push_back({parameter.name, sign * scale * datum.model.values(place),
+                            scale * u95(datum.covariance(place, place)), unit});
+  }
+  if (line.numbers.size() == 1) {
+    line.value = line.numbers.front();
+    line.numbers.clear();
+  } else if (line.kind == LineKind::kBase || line.kind == LineKind::kTool) {
+    const Eigen::Vector3d shift = datum.model.values.segment<3>(item.places.front());
+    const Matrix3 covariance = datum.covariance.block<3, 3>(item.places.front(), item.places.front());
+    const double length = shift.norm();
+    const Vector3 along = length > 0 ? Vector3(shift / length) : Vector3::UnitX();
+    line.value = BudgetNumber{"shift", to_mm(length), to_mm(u95(along.dot(covariance * along))), "mm"};
+  }
+}
+
+/// Whether a value is there at all, and far beyond what is usual; then what to do.
+void judge(const Datum& datum, BudgetItem& item) {
+  BudgetLine& line = item.line;
+  const std::optional<double> usual = usual_value(item, datum.model);
+  if (!usual || !line.value) return;
+  line.times_usual = std::abs(line.value->value) / *usual;
+  const bool sure = std::abs(line.value->value) - line.value->u95 > *usual;
+  if (sure && *line.times_usual > kStandsOut) line.action = action_for(line, datum.model);
+}
+
+/// The item that a parameter belongs to; -1: none.
+std::ptrdiff_t item_with(const std::vector<BudgetItem>& items, Eigen::Index place) {
+  const auto found = std::find_if(items.begin(), items.end(), [&](const BudgetItem& item) {
+    return std::find(item.places.begin(), item.places.end(), place) != item.places.end();
+  });
+  return found == items.end() ? -1 : found - items.begin();
+}
+
+/// Leaves out lines of single parameters that count as being on their drawing, and names them where they are counted:
+/// beside their partners, or, where they have many or none, in one line of what is not told.
+void fold(const Datum& datum, std::vector<BudgetItem>& items, BudgetLine& untold) {
+  constexpr std::size_t kMostPartners = 2;
+  std::set<std::ptrdiff_t> folded;
+  for (const Datum::OnDrawing& one : datum.on_drawing) {
+    const std::ptrdiff_t own = item_with(items, one.parameter);
+    if (own < 0 || items[static_cast<std::size_t>(own)].places.size() > 1) continue;
+    folded.insert(own);
+    std::set<std::ptrdiff_t> partners;
+    for (const Eigen::Index place : one.with) {
+      const std::ptrdiff_t partner = item_with(items, place);
+      if (partner >= 0 && partner != own) partners.insert(partner);
+    }
+    const std::string& name = items[static_cast<std::size_t>(own)].line.line;
+    if (partners.empty() || partners.size() > kMostPartners) {
+      untold.with.push_back(name);
+    } else {
+      for (const std::ptrdiff_t partner : partners) items[static_cast<std::size_t>(partner)].line.with.push_back(name);
+    }
+  }
+  for (auto it = folded.rbegin(); it != folded.rend(); ++it) items.erase(items.begin() + *it);
+}
+
+BudgetLine named(LineKind kind, std::string name) {
+  BudgetLine line;
+  line.kind = kind;
+  line.line = std::string(to_string(kind));
+  line.name = std::move(name);
+  return line;
+}
+
+/// Adds sizes and share of a line that does `effect` to the poses, where the error is `total`.
+BudgetLine sized(BudgetLine line, const Eigen::Matrix3Xd& effect, const Eigen::Matrix3Xd& total) {
+  const double whole = mean_square(total);
+  line.alone_rms = std::sqrt(mean_square(effect));
+  line.alone_max = effect.colwise().norm().maxCoeff();
+  line.share = whole > 0 ? inner(effect, total) / whole : 0;
+  line.left_if_right = std::sqrt(mean_square(total - effect));
+  return line;
+}
+
+/// m², of a position: what the instrument says of its own noise.
+double stated_mean_square(const MeasurementBatch& positions, const Cell& cell) {
+  double sum = 0;
+  for (const Measurement& m : positions.measurements) sum += 3 * std::pow(m.sigma.value_or(cell.tracker.sigma), 2);
+  return sum / static_cast<double>(positions.measurements.size());
+}
+
+/// Splits what is left into the noise that the instrument states and the rest.
+void add_rest(const Eigen::Matrix3Xd& rest, const Eigen::Matrix3Xd& total, double stated, BudgetView& view) {
+  const double whole = mean_square(total);
+  const double of_instrument = std::min(stated, mean_square(rest));
+  BudgetLine left = sized(named(LineKind::kRest, "what is left, by no cause that is known"), rest, total);
+  left.share -= whole > 0 ? of_instrument / whole : 0;
+  left.alone_rms = std::sqrt(mean_square(rest) - of_instrument);
+  view.lines.push_back(std::move(left));
+  BudgetLine noise = named(LineKind::kInstrument, "the noise that the instrument states");
+  noise.alone_rms = std::sqrt(of_instrument);
+  noise.alone_max = noise.alone_rms;
+  noise.share = whole > 0 ? of_instrument / whole : 0;
+  noise.left_if_right = std::sqrt(std::max(whole - of_instrument, 0.0));
+  view.lines.push_back(std::move(noise));
+}
+
+bool is_frame(LineKind kind) { return kind == LineKind::kBase || kind == LineKind::kTool; }
+
+struct ViewAsked {
+  const std::vector<BudgetItem>& items;
+  const Effects& effects;
+  const BudgetLine& untold;
+  double stated = 0;  // m²
+  bool has_bias = false;
+};
+
+/// `seen` maps vectors at the poses to what of them counts.
+template <typename Seen>
+BudgetView view_of(const ViewAsked& asked, bool frames, const Seen& seen) {
+  BudgetView view;
+  const Eigen::Matrix3Xd total = seen(asked.effects.total);
+  view.error_rms = std::sqrt(mean_square(total));
+  for (std::size_t k = 0; k < asked.items.size(); ++k) {
+    if (!frames && is_frame(asked.items[k].line.kind)) continue;
+    view.lines.push_back(sized(asked.items[k].line, seen(asked.effects.lines[k]), total));
+  }
+  if (asked.has_bias)
+    view.lines.push_back(
+        sized(named(LineKind::kLearned, "what is learned beyond the physics"), seen(asked.effects.learned), total));
+  std::stable_sort(view.lines.begin(), view.lines.end(),
+                   [](const BudgetLine& one, const BudgetLine& other) { return one.share > other.share; });
+  // What frames do is out of every vector, so that their small remainder counts with what acts together.
+  Eigen::Matrix3Xd together = asked.effects.together;
+  for (std::size_t k = 0; k < asked.items.size(); ++k)
+    if (!frames && is_frame(asked.items[k].line.kind)) together += asked.effects.lines[k];
+  view.lines.push_back(sized(named(LineKind::kTogether, "what the lines do together"), seen(together), total));
+  if (!asked.untold.with.empty()) view.lines.push_back(asked.untold);
+  add_rest(seen(asked.effects.rest), total, asked.stated, view);
+  return view;
+}
+
+std::vector<PoseContext> contexts_of(const MeasurementBatch& positions) {
+  std::vector<PoseContext> contexts;
+  for (const Measurement& m : positions.measurements) contexts.push_back(m.context);
+  return contexts;
+}
+
+/// What `positions` leave by the drawing and by the physics; where nothing is learned, that is all.
+LeftAt left_by(const PhysicalModel& physics, const MeasurementBatch& positions) {
+  const auto n = std::ssize(positions.measurements);
+  LeftAt left{Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), {}};
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Measurement& m = positions.measurements[static_cast<std::size_t>(i)];
+    left.drawing.col(i) = m.p_W - physics.nominal_pose_W(m.context).translation();
+    left.physics.col(i) = m.p_W - physics.pose_W(m.context).translation();
+  }
+  left.all = left.physics;
+  return left;
+}
+
+LeftAt left_by(const CompensatedModel& model, const MeasurementBatch& positions) {
+  const CompensatedModel::LevelErrors errors = model.errors_B(positions);
+  const Matrix3 R_WB = model.parts().physics.X_WB.linear();
+  return {R_WB * errors.nominal, R_WB * errors.calibrated, R_WB * errors.compensated};
+}
+
+/// `positions` is not empty.
+ErrorBudget budget_of(const Identified& found, const LeftAt& left, const MeasurementBatch& positions, bool has_bias) {
+  ErrorBudget budget;
+  budget.poses = static_cast<int>(positions.measurements.size());
+  const Datum datum = datum_of(found, contexts_of(positions));
+  std::vector<BudgetItem> items = items_of(datum.model);
+  BudgetLine untold = named(LineKind::kUntold, "what these poses cannot tell");
+  fold(datum, items, untold);
+  const std::vector<Parameter> parameters = datum.model.parameters();
+  for (BudgetItem& item : items) {
+    add_values(datum, parameters, item);
+    judge(datum, item);
+  }
+  const Effects effects = effects_of(left, datum, items, positions);
+  const ViewAsked asked{items, effects, untold, stated_mean_square(positions, *datum.model.cell), has_bias};
+  budget.as_it_stands = view_of(asked, true, [](const Eigen::Matrix3Xd& all) { return all; });
+  budget.beyond_frames = view_of(asked, false, BeyondFrames(datum.model, positions));
+  return budget;
+}
+
+}  // namespace
+
+ErrorBudget error_budget(const CompensatedModel& model, const MeasurementBatch& measured) {
+  const MeasurementBatch positions = positions_of(measured);
+  if (positions.measurements.empty()) return {};
+  const ModelParts& parts = model.parts();
+  return budget_of({parts.physics, parts.parameters, parts.covariance}, left_by(model, positions), positions,
+                   model.bias().has_value());
+}
+
+ErrorBudget error_budget(const CalibrationResult& calibration, const MeasurementBatch& measured) {
+  const MeasurementBatch positions = positions_of(measured);
+  if (positions.measurements.empty()) return {};
+  return budget_of({calibration.model, calibration.parameters, calibration.covariance},
+                   left_by(calibration.model, positions), positions, false);
+}
+
+}  // namespace trammel

@@ -1,0 +1,179 @@
+#include "server/compensate/budget/items.h"
+
+#include <algorithm>
+#include <map>
+
+#include "server/error_sources/instruments.h"
+#include "server/error_sources/spelling.h"
+
+namespace trammel {
+
+namespace {
+
+/// `alpha3` -> {`alpha`, 2}: the letters of a parameter and its joint, 0-based.
+struct Symbol {
+  std::string letters;
+  int joint = -1;
+};
+
+Symbol symbol_of(const std::string& parameter) {
+  const auto digit = parameter.find_first_of("0123456789");
+  if (digit == std::string::npos) return {parameter, -1};
+  return {parameter.substr(0, digit), std::stoi(parameter.substr(digit)) - 1};
+}
+
+/// The line of one parameter of the links.
+BudgetLine line_of_link(const std::string& parameter, const Chain& robot) {
+  const auto [letters, joint] = symbol_of(parameter);
+  const bool slides = robot.joint(joint).type == JointType::kPrismatic;
+  const int n = joint + 1;
+  BudgetLine line;
+  line.joint = joint;
+  if (letters == "q" || (letters == "d" && slides)) {
+    line.line = fmt::format("zero:{}", n);
+    line.kind = LineKind::kJointZero;
+    line.name = fmt::format("the zero of joint {}", n);
+  } else if (letters == "d" || letters == "a") {
+    line.line = "length:" + parameter;
+    line.kind = LineKind::kLength;
+    line.name = fmt::format("the {} of link {} ({})", letters == "a" ? "length" : "offset", n, parameter);
+  } else {
+    line.line = "twist:" + parameter;
+    line.kind = LineKind::kTwist;
+    line.name = n < robot.size() ? fmt::format("the angle between axes {} and {} ({})", n, n + 1, parameter)
+                                 : fmt::format("the angle of the flange to axis {} ({})", n, parameter);
+  }
+  return line;
+}
+
+/// Parameters of tools end in `[ID]` where a cell has several.
+std::string tool_of(const std::string& parameter) {
+  const auto bracket = parameter.find('[');
+  return bracket == std::string::npos ? "" : parameter.substr(bracket + 1, parameter.size() - bracket - 2);
+}
+
+void add_links(const PhysicalModel& model, std::size_t source, Eigen::Index first, std::vector<BudgetItem>& items) {
+  const std::vector<Parameter>& parameters = model.sources[source]->parameters();
+  Eigen::Index place = first;
+  for (const Parameter& parameter : parameters)
+    items.push_back({line_of_link(parameter.name, model.cell->robot), source, {place++}, false});
+}
+
+void add_tools(const PhysicalModel& model, std::size_t source, Eigen::Index first, std::vector<BudgetItem>& items) {
+  std::map<std::string, BudgetItem> by_tool;
+  Eigen::Index place = first;
+  for (const Parameter& parameter : model.sources[source]->parameters()) {
+    const std::string tool = tool_of(parameter.name);
+    BudgetItem& item = by_tool[tool];
+    item.line.line = tool.empty() ? "tool" : "tool:" + tool;
+    item.line.kind = LineKind::kTool;
+    item.line.name = tool.empty() ? "the tool on the flange" : fmt::format("the tool {} on the flange", tool);
+    item.source = source;
+    item.places.push_back(place++);
+  }
+  for (auto& [tool, item] : by_tool) items.push_back(std::move(item));
+}
+
+void add_gearboxes(const PhysicalModel& model, std::size_t source, Eigen::Index first,
+                   std::vector<BudgetItem>& items) {
+  const auto joints = std::ssize(model.sources[source]->parameters());
+  for (Eigen::Index j = 0; j < joints; ++j) {
+    BudgetItem item;
+    item.line.line = fmt::format("compliance:{}", j + 1);
+    item.line.kind = LineKind::kJointCompliance;
+    item.line.joint = static_cast<int>(j);
+    item.line.name = fmt::format("joint {} giving way under its load", j + 1);
+    item.source = source;
+    item.places = {first + j};
+    items.push_back(std::move(item));
+  }
+}
+
+BudgetItem whole(const PhysicalModel& model, std::size_t source, Eigen::Index first) {
+  const ErrorSource& one = *model.sources[source];
+  BudgetItem item;
+  item.line.line = one.name();
+  item.line.kind = one.cause().part == causes::Part::kBase ? LineKind::kBase : LineKind::kCause;
+  item.line.cause = one.cause().spelling;
+  item.line.joint = one.joint();
+  item.line.name = item.line.kind == LineKind::kBase ? "the place of the base" : in_words(one.name());
+  item.source = source;
+  item.whole_source = true;
+  for (Eigen::Index k = 0; k < std::ssize(one.parameters()); ++k) item.places.push_back(first + k);
+  return item;
+}
+
+bool is_own_weight(const ErrorSource& source) { return source.cause().spelling == "self_weight"; }
+
+/// Payload, balancers, cables: what the gearboxes then carry.
+bool changes_load(const ErrorSource& source) {
+  return source.cause().acts.on == causes::ActsOn::kLoad && !is_own_weight(source);
+}
+
+/// The model without those of its sources for which `goes` is true.
+template <typename Goes>
+PhysicalModel without_sources(const PhysicalModel& model, const Goes& goes) {
+  PhysicalModel rest = model;
+  rest.sources.clear();
+  std::vector<double> values;
+  Eigen::Index place = 0;
+  for (std::size_t k = 0; k < model.sources.size(); ++k) {
+    const auto count = std::ssize(model.sources[k]->parameters());
+    if (!goes(k)) {
+      rest.sources.push_back(model.sources[k]);
+      for (Eigen::Index i = 0; i < count; ++i) values.push_back(model.values(place + i));
+    }
+    place += count;
+  }
+  rest.values = Eigen::Map<const Eigen::VectorXd>(values.data(), std::ssize(values));
+  return rest;
+}
+
+}  // namespace
+
+std::vector<BudgetItem> items_of(const PhysicalModel& model) {
+  std::vector<BudgetItem> items;
+  Eigen::Index first = 0;
+  for (std::size_t k = 0; k < model.sources.size(); ++k) {
+    const ErrorSource& source = *model.sources[k];
+    const auto count = std::ssize(source.parameters());
+    if (source.cause().part == causes::Part::kLinks) {
+      add_links(model, k, first, items);
+    } else if (source.cause().part == causes::Part::kTool) {
+      add_tools(model, k, first, items);
+    } else if (source.cause().spelling == "compliance") {
+      add_gearboxes(model, k, first, items);
+    } else if (!is_of_instruments(source) && !is_own_weight(source)) {
+      items.push_back(whole(model, k, first));
+    }
+    first += count;
+  }
+  return items;
+}
+
+PhysicalModel without(const PhysicalModel& model, const BudgetItem& item) {
+  if (item.whole_source) return without_sources(model, [&](std::size_t k) { return k == item.source; });
+  PhysicalModel rest = model;
+  for (const Eigen::Index place : item.places) rest.values(place) = 0;
+  return rest;
+}
+
+PhysicalModel with_told_load(const PhysicalModel& model) {
+  return without_sources(model, [&](std::size_t k) { return changes_load(*model.sources[k]); });
+}
+
+BudgetItem in_told_load(const PhysicalModel& model, const BudgetItem& item) {
+  Eigen::Index gone = 0;
+  std::size_t sources_gone = 0;
+  for (std::size_t k = 0; k < item.source; ++k) {
+    if (!changes_load(*model.sources[k])) continue;
+    gone += std::ssize(model.sources[k]->parameters());
+    ++sources_gone;
+  }
+  BudgetItem moved = item;
+  moved.source -= sources_gone;
+  for (Eigen::Index& place : moved.places) place -= gone;
+  return moved;
+}
+
+}  // namespace trammel

@@ -1,0 +1,55 @@
+#include "server/report/budget_json.h"
+
+#include "server/base/units.h"
+
+namespace trammel {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json json_of(const BudgetLine& line) {
+  ordered_json json = {{"line", line.line},
+                       {"kind", line.cause_or_kind()},
+                       {"name", line.name},
+                       {"joint", nullptr},
+                       {"value", nullptr},
+                       {"u95", nullptr},
+                       {"unit", nullptr},
+                       {"alone_rms_mm", to_mm(line.alone_rms)},
+                       {"alone_max_mm", to_mm(line.alone_max)},
+                       {"share", line.share},
+                       {"left_if_right_mm", to_mm(line.left_if_right)},
+                       {"times_usual", nullptr},
+                       {"with", line.with},
+                       {"action", line.action}};
+  if (line.joint >= 0) json["joint"] = line.joint + 1;
+  if (line.value) {
+    json["value"] = line.value->value;
+    json["u95"] = line.value->u95;
+    json["unit"] = line.value->unit;
+  }
+  if (line.times_usual) json["times_usual"] = *line.times_usual;
+  if (!line.numbers.empty()) json["numbers"] = ordered_json::array();
+  for (const BudgetNumber& number : line.numbers)
+    json["numbers"].push_back(
+        {{"name", number.name}, {"value", number.value}, {"u95", number.u95}, {"unit", number.unit}});
+  return json;
+}
+
+ordered_json json_of(const BudgetView& view) {
+  ordered_json lines = ordered_json::array();
+  for (const BudgetLine& line : view.lines) lines.push_back(json_of(line));
+  return {{"nominal_rms_mm", to_mm(view.error_rms)}, {"lines", std::move(lines)}};
+}
+
+}  // namespace
+
+ordered_json budget_json(const ErrorBudget& budget) {
+  ordered_json json = json_of(budget.as_it_stands);
+  json["poses"] = budget.poses;
+  json["beyond_frames"] = json_of(budget.beyond_frames);
+  return json;
+}
+
+}  // namespace trammel

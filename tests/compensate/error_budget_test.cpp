@@ -1,0 +1,240 @@
+// An arm whose lengths are written down here, not read by the project's kinematics: its budget must name what was put
+// wrong.
+#include "server/compensate/budget/error_budget.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <numeric>
+#include <random>
+
+#include "server/base/text_file.h"
+#include "server/compensate/budget/budget_words.h"
+#include "server/compensate/model_file.h"
+#include "server/trainer/pipeline/train.h"
+#include "tests/support/demand.h"
+
+namespace trammel {
+namespace {
+
+constexpr double kRight = 1.5707963267948966;
+constexpr double kDegree = kRight / 90;
+
+/// theta, d, a, alpha of each link, m and rad; how the controller counts.
+struct Link {
+  double theta = 0, d = 0, a = 0, alpha = 0, sign = 1;
+};
+using Arm = std::vector<Link>;
+
+Arm irb120() {
+  return {{0, 0.29, 0, -kRight},
+          {-kRight, 0, 0.27, 0},
+          {0, 0, 0.07, -kRight},
+          {2 * kRight, 0.302, 0, -kRight},
+          {0, 0, 0, kRight},
+          {0, 0.072, 0, 0}};
+}
+
+/// What is put wrong.
+struct World {
+  Arm arm = irb120();
+  Eigen::VectorXd zeros = Eigen::VectorXd::Zero(6);  ///< rad, as the controller counts: the joint stands farther
+  Vector3 base = Vector3::Zero();                    ///< m, where the robot really stands
+  Vector3 tool = Vector3(0.04, -0.025, 0.14);        ///< m
+};
+
+Vector3 tip(const World& world, const Eigen::VectorXd& q) {
+  Eigen::Isometry3d X = Eigen::Isometry3d::Identity();
+  X.translate(world.base);
+  for (std::size_t i = 0; i < world.arm.size(); ++i) {
+    const Link& link = world.arm[i];
+    const auto k = static_cast<Eigen::Index>(i);
+    X.rotate(Eigen::AngleAxisd(link.theta + link.sign * (q(k) + world.zeros(k)), Vector3::UnitZ()));
+    X.translate(Vector3(link.a, 0, link.d));
+    X.rotate(Eigen::AngleAxisd(link.alpha, Vector3::UnitX()));
+  }
+  return X * world.tool;
+}
+
+std::vector<Eigen::VectorXd> drawn_poses(int count) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> angle(-1.1, 1.1);
+  std::vector<Eigen::VectorXd> poses;
+  for (int k = 0; k < count; ++k) poses.push_back(Eigen::VectorXd::NullaryExpr(6, [&] { return angle(random); }));
+  return poses;
+}
+
+MeasurementBatch measured(const World& world, const std::vector<Eigen::VectorXd>& poses) {
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> noise(0, 0.013e-3);
+  MeasurementBatch batch;
+  batch.id = "own-arm";
+  for (const Eigen::VectorXd& q : poses) {
+    Measurement m;
+    m.pose_id = fmt::format("p{}", batch.measurements.size() + 1);
+    m.row = static_cast<int>(batch.measurements.size()) + 2;
+    m.context.q = q;
+    m.context.tool = "tip";
+    m.p_W = tip(world, q) + Vector3(noise(random), noise(random), noise(random));
+    batch.measurements.push_back(std::move(m));
+  }
+  return batch;
+}
+
+std::shared_ptr<const Cell> own_cell(const std::string& robot_yaml, const std::string& sources) {
+  const std::string text = fmt::format(
+      "version: 1\ncell: own\nrobot: robot.yaml\nbase: {{xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, 0]}}\n"
+      "tools: {{tip: {{xyz_mm: [40, -25, 140], q_wxyz: [1, 0, 0, 0]}}}}\n"
+      "tracker: {{sigma_mm: 0.013, sigma_deg: 0.003}}\nmodel: {{error_sources: [{}], bias: none}}\n",
+      sources);
+  return std::make_shared<const Cell>(test::demand(parse_cell(text, robot_yaml, "cell.yaml")));
+}
+
+std::string shipped_robot() {
+  return test::demand(read_text_file(TRAMMEL_SOURCE_DIR "/models/abb_irb120-3-06.yaml"));
+}
+
+CompensatedModel trained(const World& world, const std::string& sources, int poses = 120,
+                         const std::string& robot_yaml = shipped_robot()) {
+  const auto cell = own_cell(robot_yaml, sources);
+  TrainOptions options;
+  options.bias = "none";
+  return test::demand(train(
+      cell, test::demand(check_against_cell(measured(world, drawn_poses(poses)), *cell, drawn(0, 1))), options));
+}
+
+const ErrorBudget& budget_of(const CompensatedModel& model) {
+  EXPECT_TRUE(model.parts().budget);
+  return *model.parts().budget;
+}
+
+/// mm rms: how far the tip goes when joint `j` (0-based) gets its zero back.
+double alone_by_hand(const World& world, Eigen::Index j, const std::vector<Eigen::VectorXd>& poses) {
+  World right = world;
+  right.zeros(j) = 0;
+  double sum = 0;
+  for (const Eigen::VectorXd& q : poses) sum += (tip(world, q) - tip(right, q)).squaredNorm();
+  return 1e3 * std::sqrt(sum / static_cast<double>(poses.size()));
+}
+
+double sum_of_shares(const BudgetView& view) {
+  return std::accumulate(view.lines.begin(), view.lines.end(), 0.0,
+                         [](double sum, const BudgetLine& line) { return sum + line.share; });
+}
+
+TEST(ErrorBudget, LeadsWithTheLostZeroItsAngleItsMillimetresAndWhatToDo) {
+  World world;
+  world.zeros(3) = 3 * kDegree;
+  world.zeros(4) = -2 * kDegree;
+  const CompensatedModel model = trained(world, "base, geometry");
+  const ErrorBudget& budget = budget_of(model);
+  ASSERT_GT(budget.as_it_stands.lines.size(), 2u);
+  for (const int joint : {4, 5}) {
+    const BudgetLine* line = budget.line(fmt::format("zero:{}", joint));
+    ASSERT_NE(line, nullptr) << joint;
+    const double truth = world.zeros(joint - 1) / kDegree;
+    ASSERT_TRUE(line->value);
+    EXPECT_EQ(line->value->unit, "deg");
+    EXPECT_NEAR(line->value->value, truth, std::max(2 * line->value->u95, 0.005)) << joint;
+    EXPECT_LT(line->value->u95, 0.05) << joint;
+    const double by_hand = alone_by_hand(world, joint - 1, drawn_poses(120));
+    EXPECT_NEAR(1e3 * line->alone_rms, by_hand, 0.02 * by_hand) << joint;
+    EXPECT_EQ(line->action, fmt::format("re-master joint {}", joint));
+    EXPECT_GT(*line->times_usual, 10) << joint;
+  }
+  EXPECT_EQ(budget.as_it_stands.lines.front().line.substr(0, 5), "zero:");
+  EXPECT_NE(in_words(budget).at(1).find("re-master joint"), std::string::npos) << in_words(budget).at(1);
+}
+
+TEST(ErrorBudget, AddsUpToTheWholeInBothViews) {
+  World world;
+  world.zeros << 2e-3, 30e-3, -1e-3, 52e-3, -35e-3, 3e-3;
+  world.base = Vector3(0.004, -0.003, 0.002);
+  world.tool += Vector3(0.001, 0, -0.002);
+  const CompensatedModel model = trained(world, "base, geometry, tool");
+  const ErrorBudget& budget = budget_of(model);
+  EXPECT_NEAR(sum_of_shares(budget.as_it_stands), 1, 1e-9);
+  EXPECT_NEAR(sum_of_shares(budget.beyond_frames), 1, 1e-9);
+  EXPECT_LT(budget.beyond_frames.error_rms, budget.as_it_stands.error_rms);
+  EXPECT_NEAR(budget.as_it_stands.error_rms, model.parts().training.nominal.rms, 1e-12);
+}
+
+TEST(ErrorBudget, CountsWhatThePosesCannotTellApartOnceAndNamesBoth) {
+  World world;
+  world.tool += Vector3(0, 0, 0.005);  // along the sixth axis, as d6 is
+  const CompensatedModel model = trained(world, "base, geometry, tool");
+  const ErrorBudget& budget = budget_of(model);
+  const BudgetLine* tool = budget.line("tool");
+  const BudgetLine* base = budget.line("base");
+  ASSERT_NE(tool, nullptr);
+  ASSERT_NE(base, nullptr);
+  const auto names = [](const BudgetLine& line, const char* other) {
+    return std::find(line.with.begin(), line.with.end(), other) != line.with.end();
+  };
+  EXPECT_TRUE(names(*tool, "length:d6"));
+  EXPECT_TRUE(names(*base, "zero:1"));
+  EXPECT_TRUE(names(*base, "length:d1"));
+  EXPECT_NEAR(tool->value->value, 5, 0.1);
+  EXPECT_EQ(budget.line("length:d6"), nullptr);
+  for (const BudgetLine& line : budget.as_it_stands.lines) {
+    const bool is_tool = line.line == "tool";
+    EXPECT_TRUE(is_tool || line.alone_rms < 0.3e-3) << line.line;
+  }
+}
+
+TEST(ErrorBudget, TellsAHealthyArmThatNothingStandsOut) {
+  World world;
+  world.zeros << 2e-4, -3e-4, 2e-4, 4e-4, -5e-4, 3e-4;
+  world.base = Vector3(0.02, -0.01, 0.005);
+  world.arm[1].a += 0.2e-3;
+  world.arm[2].alpha += 3e-4;
+  const CompensatedModel model = trained(world, "base, geometry");
+  for (const BudgetLine& line : budget_of(model).as_it_stands.lines) EXPECT_EQ(line.action, "") << line.line;
+}
+
+TEST(ErrorBudget, OfABaseThatStandsElsewhereIsNothingBeyondFrames) {
+  World world;
+  world.base = Vector3(0.05, -0.03, 0.01);
+  const CompensatedModel model = trained(world, "base, geometry");
+  const ErrorBudget& budget = budget_of(model);
+  EXPECT_NEAR(1e3 * budget.as_it_stands.error_rms, 59.2, 0.1);
+  EXPECT_LT(1e3 * budget.beyond_frames.error_rms, 0.05);
+  EXPECT_EQ(budget.as_it_stands.lines.front().line, "base");
+  EXPECT_NEAR(budget.as_it_stands.lines.front().share, 1, 0.01);
+}
+
+TEST(ErrorBudget, TellsAZeroAsTheControllerCounts) {
+  World world;
+  world.arm[3].sign = -1;
+  world.zeros(3) = 3 * kDegree;
+  std::string robot = shipped_robot();
+  // The fourth joint of the shipped file, counted the other way.
+  std::size_t row = robot.find("joints:");
+  for (int k = 0; k < 4; ++k) row = robot.find("- {", row + 1);
+  ASSERT_NE(row, std::string::npos) << robot;
+  robot.insert(row + 3, "sign: -1, ");
+  const CompensatedModel model = trained(world, "base, geometry", 120, robot);
+  const BudgetLine* line = budget_of(model).line("zero:4");
+  ASSERT_NE(line, nullptr);
+  EXPECT_NEAR(line->value->value, 3, 0.05);
+}
+
+TEST(ErrorBudget, NamesWhatTooFewPosesCannotTellInOneLine) {
+  World world;
+  const CompensatedModel model = trained(world, "base, geometry", 6);
+  const BudgetLine* untold = budget_of(model).line("untold");
+  ASSERT_NE(untold, nullptr);
+  EXPECT_GT(untold->with.size(), 3u);
+  for (const BudgetLine& line : budget_of(model).as_it_stands.lines) EXPECT_EQ(line.action, "") << line.line;
+}
+
+TEST(ErrorBudget, IsKeptInTheFileOfItsModel) {
+  World world;
+  world.zeros(4) = 0.01;
+  const CompensatedModel model = trained(world, "base, geometry");
+  const CompensatedModel read = test::demand(deserialize(serialize(model), "model.json"));
+  EXPECT_EQ(in_words(budget_of(read), 40), in_words(budget_of(model), 40));
+}
+
+}  // namespace
+}  // namespace trammel
