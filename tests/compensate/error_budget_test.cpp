@@ -27,12 +27,8 @@ struct Link {
 using Arm = std::vector<Link>;
 
 Arm irb120() {
-  return {{0, 0.29, 0, -kRight},
-          {-kRight, 0, 0.27, 0},
-          {0, 0, 0.07, -kRight},
-          {2 * kRight, 0.302, 0, -kRight},
-          {0, 0, 0, kRight},
-          {0, 0.072, 0, 0}};
+  return {{0, 0.29, 0, -kRight},           {-kRight, 0, 0.27, 0}, {0, 0, 0.07, -kRight},
+          {2 * kRight, 0.302, 0, -kRight}, {0, 0, 0, kRight},     {0, 0.072, 0, 0}};
 }
 
 /// What is put wrong.
@@ -90,17 +86,15 @@ std::shared_ptr<const Cell> own_cell(const std::string& robot_yaml, const std::s
   return std::make_shared<const Cell>(test::demand(parse_cell(text, robot_yaml, "cell.yaml")));
 }
 
-std::string shipped_robot() {
-  return test::demand(read_text_file(TRAMMEL_SOURCE_DIR "/models/abb_irb120-3-06.yaml"));
-}
+std::string shipped_robot() { return test::demand(read_text_file(TRAMMEL_SOURCE_DIR "/models/abb_irb120-3-06.yaml")); }
 
 CompensatedModel trained(const World& world, const std::string& sources, int poses = 120,
                          const std::string& robot_yaml = shipped_robot()) {
   const auto cell = own_cell(robot_yaml, sources);
   TrainOptions options;
   options.bias = "none";
-  return test::demand(train(
-      cell, test::demand(check_against_cell(measured(world, drawn_poses(poses)), *cell, drawn(0, 1))), options));
+  return test::demand(
+      train(cell, test::demand(check_against_cell(measured(world, drawn_poses(poses)), *cell, drawn(0, 1))), options));
 }
 
 const ErrorBudget& budget_of(const CompensatedModel& model) {

@@ -7,9 +7,9 @@ namespace trammel {
 
 namespace {
 
-constexpr std::array<std::string_view, 12> kKinds = {
-    "base", "joint_zero", "length", "twist", "tool", "joint_compliance", "cause", "learned", "together", "untold",
-    "rest", "instrument"};
+constexpr std::array<std::string_view, 12> kKinds = {"base",     "joint_zero",       "length", "twist",
+                                                     "tool",     "joint_compliance", "cause",  "learned",
+                                                     "together", "untold",           "rest",   "instrument"};
 
 }  // namespace
 

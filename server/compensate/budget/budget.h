@@ -41,18 +41,18 @@ struct BudgetNumber {
 struct BudgetLine {
   std::string line;  ///< `zero:4`, `length:a2`, `twist:alpha3`, `base`, `tool`, `compliance:2`, else as in a cell file
   LineKind kind = LineKind::kCause;
-  std::string cause;                     ///< of a kCause, its spelling: `gear_transmission`
-  int joint = -1;                        ///< 0-based; -1: of no single joint
-  std::string name;                      ///< for people: `the zero of joint 4`
-  std::optional<BudgetNumber> value;     ///< the one number of the line; a distance for a place
-  std::vector<BudgetNumber> numbers;     ///< of a line with several, each of them
-  double alone_rms = 0;                  ///< m, of the poses: what the line does to them
-  double alone_max = 0;                  ///< m
-  double share = 0;                      ///< of the mean square error; may be negative; all lines add to 1
-  double left_if_right = 0;              ///< m rms: what is left of the error if only this line were put right
-  std::optional<double> times_usual;     ///< the value over what arms of this kind show
-  std::vector<std::string> with;         ///< lines that the poses cannot tell from it: they are counted here
-  std::string action;                    ///< what to do; empty: nothing stands out
+  std::string cause;                  ///< of a kCause, its spelling: `gear_transmission`
+  int joint = -1;                     ///< 0-based; -1: of no single joint
+  std::string name;                   ///< for people: `the zero of joint 4`
+  std::optional<BudgetNumber> value;  ///< the one number of the line; a distance for a place
+  std::vector<BudgetNumber> numbers;  ///< of a line with several, each of them
+  double alone_rms = 0;               ///< m, of the poses: what the line does to them
+  double alone_max = 0;               ///< m
+  double share = 0;                   ///< of the mean square error; may be negative; all lines add to 1
+  double left_if_right = 0;           ///< m rms: what is left of the error if only this line were put right
+  std::optional<double> times_usual;  ///< the value over what arms of this kind show
+  std::vector<std::string> with;      ///< lines that the poses cannot tell from it: they are counted here
+  std::string action;                 ///< what to do; empty: nothing stands out
   [[nodiscard]] std::string cause_or_kind() const;
 };
 

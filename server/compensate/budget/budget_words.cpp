@@ -32,7 +32,8 @@ std::string detail(const BudgetLine& line) {
   if (line.value) parts.push_back(value_of(*line.value));
   if (!line.with.empty() && line.kind != LineKind::kUntold)
     parts.push_back("these poses cannot tell it from " + joined(line.with));
-  if (line.times_usual && !line.action.empty()) parts.push_back(fmt::format("{:.0f} times what is usual", *line.times_usual));
+  if (line.times_usual && !line.action.empty())
+    parts.push_back(fmt::format("{:.0f} times what is usual", *line.times_usual));
   return parts.empty() ? "" : fmt::format(" ({})", fmt::join(parts, "; "));
 }
 
@@ -40,17 +41,17 @@ std::string detail(const BudgetLine& line) {
 
 std::string sentence(const BudgetLine& line) {
   if (line.kind == LineKind::kUntold) return fmt::format("{}: {}", line.name, joined(line.with));
-  std::string text = fmt::format("{}{}: {:.3f} mm alone, {:.0f} %", line.name, detail(line), to_mm(line.alone_rms),
-                                 100 * line.share);
+  std::string text =
+      fmt::format("{}{}: {:.3f} mm alone, {:.0f} %", line.name, detail(line), to_mm(line.alone_rms), 100 * line.share);
   if (!line.action.empty()) text += "; " + line.action;
   return text;
 }
 
 std::vector<std::string> in_words(const ErrorBudget& budget, int most) {
   if (budget.as_it_stands.lines.empty()) return {};
-  std::vector<std::string> text = {
-      fmt::format("the drawing is off by {:.3f} mm rms at {} poses; touching base and tool frames would leave {:.3f} mm",
-                  to_mm(budget.as_it_stands.error_rms), budget.poses, to_mm(budget.beyond_frames.error_rms))};
+  std::vector<std::string> text = {fmt::format(
+      "the drawing is off by {:.3f} mm rms at {} poses; touching base and tool frames would leave {:.3f} mm",
+      to_mm(budget.as_it_stands.error_rms), budget.poses, to_mm(budget.beyond_frames.error_rms))};
   // What stands out leads.
   std::vector<const BudgetLine*> lines;
   for (const BudgetLine& line : budget.as_it_stands.lines) lines.push_back(&line);

@@ -7,7 +7,8 @@
 
 namespace trammel {
 
-/// One line for people: `the zero of joint 4 (joint 4 stands 3.000 ± 0.004 deg beyond what it shows): 14.6 mm alone, 46 %`.
+/// One line for people: `the zero of joint 4 (joint 4 stands 3.000 ± 0.004 deg beyond what it shows): 14.6 mm alone, 46
+/// %`.
 [[nodiscard]] std::string sentence(const BudgetLine& line);
 
 /// The budget in its `most` first lines, beneath a heading that names the whole error. Empty without lines.

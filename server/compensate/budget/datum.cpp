@@ -10,12 +10,12 @@ namespace trammel {
 
 namespace {
 
-constexpr double kNothingTold = 0.1;    // of one comparison size: a direction with less is not told by the poses
-constexpr double kPartner = 0.3;        // of the effect: a parameter with more is a partner
-constexpr double kBeyondChance = 3;     // standard deviations
-constexpr int kSteps = 2;               // of Gauss-Newton: the change of the datum is small
-constexpr double kMatched = 1e-7;       // m
-constexpr double kLaterJoint = 1e-6;    // of two equal candidates the later joint counts as being on its drawing
+constexpr double kNothingTold = 0.1;  // of one comparison size: a direction with less is not told by the poses
+constexpr double kPartner = 0.3;      // of the effect: a parameter with more is a partner
+constexpr double kBeyondChance = 3;   // standard deviations
+constexpr int kSteps = 2;             // of Gauss-Newton: the change of the datum is small
+constexpr double kMatched = 1e-7;     // m
+constexpr double kLaterJoint = 1e-6;  // of two equal candidates the later joint counts as being on its drawing
 
 /// What the measurements told of the parameters that were identified, F x F in units of `sizes`: the inverse of the
 /// covariance without what the priors said.
@@ -33,8 +33,7 @@ Told told_by(const Identified& parts, const Eigen::VectorXd& sizes) {
   for (Eigen::Index k = 0; k < F; ++k)
     prior(k) = parts.parameters[static_cast<std::size_t>(told.free[static_cast<std::size_t>(k)])].parameter.prior_scale;
   const Eigen::VectorXd inverse = prior.cwiseInverse();
-  const Eigen::MatrixXd scaled =
-      inverse.asDiagonal() * parts.covariance(told.free, told.free) * inverse.asDiagonal();
+  const Eigen::MatrixXd scaled = inverse.asDiagonal() * parts.covariance(told.free, told.free) * inverse.asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solved(scaled);
   const Eigen::VectorXd share = solved.eigenvalues().cwiseMax(1e-14);
   const Eigen::VectorXd beyond_prior = (share.cwiseInverse().array() - 1).max(0);

@@ -43,8 +43,7 @@ Effects effects_of(const LeftAt& left, const Datum& datum, const std::vector<Bud
 BeyondFrames::BeyondFrames(const PhysicalModel& model, const MeasurementBatch& positions) {
   const auto n = std::ssize(positions.measurements);
   std::map<std::string, Eigen::Index> tools;  // first column of each
-  for (const Measurement& m : positions.measurements)
-    tools.try_emplace(m.context.tool, 6 + 3 * std::ssize(tools));
+  for (const Measurement& m : positions.measurements) tools.try_emplace(m.context.tool, 6 + 3 * std::ssize(tools));
   Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(3 * n, 6 + 3 * std::ssize(tools));
   for (Eigen::Index i = 0; i < n; ++i) {
     const PoseContext& context = positions.measurements[static_cast<std::size_t>(i)].context;

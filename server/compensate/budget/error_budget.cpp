@@ -46,8 +46,8 @@ void add_values(const Datum& datum, const std::vector<Parameter>& parameters, Bu
     const Parameter& parameter = parameters[static_cast<std::size_t>(place)];
     const auto [scale, unit] = shown(parameter);
     const double sign = counted(item, datum.model.cell->robot);
-    line.numbers.push_back({parameter.name, sign * scale * datum.model.values(place),
-                            scale * u95(datum.covariance(place, place)), unit});
+    line.numbers.push_back(
+        {parameter.name, sign * scale * datum.model.values(place), scale * u95(datum.covariance(place, place)), unit});
   }
   if (line.numbers.size() == 1) {
     line.value = line.numbers.front();

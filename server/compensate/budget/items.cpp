@@ -74,8 +74,7 @@ void add_tools(const PhysicalModel& model, std::size_t source, Eigen::Index firs
   for (auto& [tool, item] : by_tool) items.push_back(std::move(item));
 }
 
-void add_gearboxes(const PhysicalModel& model, std::size_t source, Eigen::Index first,
-                   std::vector<BudgetItem>& items) {
+void add_gearboxes(const PhysicalModel& model, std::size_t source, Eigen::Index first, std::vector<BudgetItem>& items) {
   const auto joints = std::ssize(model.sources[source]->parameters());
   for (Eigen::Index j = 0; j < joints; ++j) {
     BudgetItem item;

@@ -83,8 +83,8 @@ std::string action_for(const BudgetLine& line, const PhysicalModel& model) {
     case LineKind::kJointZero:
       return fmt::format("re-master joint {}", n);
     case LineKind::kLength:
-      return fmt::format("compare the robot file with the maker's drawing: is it of another reach? Else look at link {}",
-                         n);
+      return fmt::format(
+          "compare the robot file with the maker's drawing: is it of another reach? Else look at link {}", n);
     case LineKind::kTwist:
       return fmt::format("look at link {}: was it bent, or a bearing changed?", n);
     case LineKind::kTool:

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/compensate/budget/error_budget.h"
 #include "server/calibrate/agreement.h"
 #include "server/calibrate/batch_check.h"
 #include "server/calibrate/calibrate_with_maps.h"
 #include "server/calibrate/frames/frames.h"
 #include "server/calibrate/identify_sessions.h"
 #include "server/calibrate/orientation_check.h"
+#include "server/compensate/budget/error_budget.h"
 #include "server/compensate/world.h"
 #include "server/measurement/gauges.h"
 #include "server/measurement/repeats.h"
