@@ -1,0 +1,128 @@
+#pragma once
+
+#include <cmath>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "server/health/evidence/check_rows.h"
+#include "server/health/evidence/check_tests.h"
+#include "server/health/evidence/lost_zeros.h"
+#include "server/health/examination/due.h"
+#include "server/health/examination/sizes.h"
+#include "server/health/examination/verdict.h"
+#include "server/health/health_check.h"
+
+/// A check's residuals are tested for each single cause beside base (and tool), for single bad poses, and as a whole.
+/// What explains most for its number of parameters (Schwarz's price, log R for each) is taken: a bad pose is refitted
+/// with the base, a cause is a change, and the rest is tested again. Effects are linear in the cause. Zeros of several
+/// joints come first, as one explanation of all poses, and are not linear.
+namespace trammel::health {
+
+inline constexpr double kAlike = 6;  ///< of scores: odds of e^3
+
+/// One check, while it is looked through.
+class Examination {
+ public:
+  Examination(const HealthOptions& options, const CauseEffects& effects, const WorkingPoses& working, CheckRows rows,
+              int tail_freedom, const Chain& robot);
+  [[nodiscard]] HealthCheck result(const CheckTimes& times);
+
+ private:
+  /// A cause that was found, and the chance of as much in a healthy check.
+  struct Named {
+    std::size_t hypothesis = 0;
+    double chance = 1;
+  };
+
+  [[nodiscard]] Questions questions() const;
+  /// Refitted in a healthy robot.
+  [[nodiscard]] Eigen::MatrixXd frames_of(const CheckRows& rows) const;
+  /// Causes that are a turning joint's zero, and that base (and tool) do not make up for.
+  [[nodiscard]] std::vector<std::size_t> zeros_of(const Chain& robot) const;
+  /// Zeros that several joints lost, or one by much, where nothing simpler explains all poses as well and they leave
+  /// nothing beyond chance.
+  [[nodiscard]] std::optional<ZerosFit> lost_zeros(const CheckTests& tests);
+  /// By Schwarz, above no change, which leaves `whole`.
+  [[nodiscard]] double score_of(const ZerosFit& fit, double whole) const {
+    return whole - fit.left - price(fit.numbers);
+  }
+  [[nodiscard]] double price(int numbers) const {
+    return std::log(static_cast<double>(rows_.residual.size())) * numbers;
+  }
+  /// True where a single cause, or the bad poses that were found, explain as much for their numbers.
+  [[nodiscard]] bool has_simpler(const CheckTests& tests, const Eigen::VectorXd& left, double score);
+  void tell_zeros(const ZerosFit& fit);
+  void tell_tool_beside(const ZerosFit& fit, const CheckRows& there);
+  void tell_other_sets(const ZerosFit& fit, SeenChange& change) const;
+  /// Adds the causes that explain as much as this one does beside `others`.
+  void tell_rivals_beside(const CheckRows& there, const Eigen::MatrixXd& others, std::size_t cause,
+                          SeenChange& change) const;
+  /// Several zeros that explain as much as what was named does, with so many `numbers`.
+  void tell_several_zeros(double left, int numbers, SeenChange& change) const;
+  void look_for_changes(const CheckTests& healthy);
+  void tell_what_is_left();
+  /// m rms of the positions, refitted.
+  [[nodiscard]] double distance_of(const RefittedRows& refitted) const;
+  /// Whether the cause is a tool that sits elsewhere, whose shift stays linear however far it is.
+  [[nodiscard]] bool is_tool(std::size_t hypothesis) const;
+  /// Whether a cause was found, and the rest is to be looked at again.
+  bool look_once(const CheckTests& tests);
+  /// Each cause once more beside the others: one that they make needless goes, one that now fits better comes.
+  void look_back();
+  /// The cause that explains most for its price; empty: none explains anything.
+  [[nodiscard]] std::optional<std::size_t> likeliest(const CheckTests& tests, const Eigen::VectorXd& left) const;
+  [[nodiscard]] bool may_be_named(std::size_t hypothesis, const CheckTests& tests, const Eigen::VectorXd& left) const;
+  /// The likeliest, though its size may be far beyond what these poses show.
+  [[nodiscard]] std::size_t most_explained(const CheckTests& tests, const Eigen::VectorXd& left) const;
+  /// Refitted besides: all that were named but the one at `k`.
+  [[nodiscard]] CheckTests beside_others(std::size_t k) const;
+  void refit_named();
+  [[nodiscard]] Estimate estimated(std::size_t hypothesis, const RefittedRows& refitted) const;
+  /// Over the working poses.
+  [[nodiscard]] Size size(std::size_t hypothesis, const Estimate& found) const;
+  /// The squared effect of these columns at the check's poses: k x k, m².
+  [[nodiscard]] Eigen::MatrixXd square_here(const Eigen::MatrixXd& columns, const RefittedRows& refitted) const;
+  /// `over`, or where it is more than the poses are off by, what they show of it.
+  void set_size(const Size& over, const Estimate& found, const Eigen::MatrixXd& here, SeenChange& change) const;
+  /// Whether it would do far more elsewhere than these poses are off by: they do not show it.
+  [[nodiscard]] bool is_extrapolated(std::size_t hypothesis, const RefittedRows& refitted) const;
+  void tell_change(const Named& named, const CheckTests& tests);
+  void tell_rivals(std::size_t hypothesis, const CheckTests& tests, const std::vector<double>& scores,
+                   SeenChange& change) const;
+  [[nodiscard]] std::vector<bool> credible(const std::vector<double>& scores) const;
+  /// True where all residuals being larger alike explains as much as the best of all causes does.
+  [[nodiscard]] bool is_scatter(std::size_t hypothesis, const CheckTests& tests, const Eigen::VectorXd& left) const;
+  void unknown_found(double chance, const Eigen::VectorXd& left, int freedom);
+  void tell_rms(const RefittedRows& refitted);
+  /// R: what it does at the check's poses.
+  [[nodiscard]] Eigen::VectorXd rows_of(const CauseSignal& signal) const;
+  /// R x S: of all signals, refitted.
+  [[nodiscard]] Eigen::MatrixXd drift(const RefittedRows& refitted) const;
+  /// lambda of each signal of a cause, of 1 m rms.
+  [[nodiscard]] std::vector<double> strengths(std::size_t cause, const RefittedRows& refitted) const;
+  void tell_smallest(const CheckTests& tests);
+
+  const HealthOptions& options_;
+  const CauseEffects& effects_;
+  const WorkingPoses& working_;
+  const CheckRows rows_;
+  const std::vector<CauseSignal> signals_;
+  const Questions questions_;
+  HealthyChecks healthy_;
+  const ZerosSearch zeros_;
+  std::vector<ZerosFit> fits_;  // of `zeros_`, where something is beyond chance
+  Sifted sifted_;
+  Eigen::MatrixXd covariance_;  // with what a change that was found may leave over
+  Eigen::MatrixXd always_;      // refitted: frames and bad poses
+  Eigen::MatrixXd nuisance_;    // the same and changes that were found
+  std::vector<Named> named_;
+  double off_ = 0;       // m rms of the positions
+  bool is_far_ = false;  // only a tool that sits elsewhere is named
+  Doubt doubt_;
+  HealthCheck check_;
+};
+
+[[nodiscard]] Eigen::MatrixXd joined(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other);
+
+}  // namespace trammel::health

@@ -1,0 +1,19 @@
+#pragma once
+
+#include "server/health/health_check.h"
+
+/// What a check comes to, and the sentence that says why.
+namespace trammel::health {
+
+/// m rms, base refitted: no small change, and effects are no longer linear.
+inline constexpr double kFarOff = kNeverOff;
+
+/// Why nothing was named though something is beyond chance.
+struct Doubt {
+  bool is_too_far = false;  ///< the poses are off by more than a small change makes
+  double scatter = 0;       ///< times a healthy robot's residuals, where nothing explains them better than noise; or 0
+};
+/// Of a check whose other members are told.
+void tell_verdict(const HealthOptions& options, const Doubt& doubt, HealthCheck& check);
+
+}  // namespace trammel::health
