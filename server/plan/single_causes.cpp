@@ -213,32 +213,47 @@ Eigen::MatrixXd CauseEffects::jacobian_at(const PoseContext& context, const Eige
 
 PoseEffects CauseEffects::at(const PoseContext& context) const { return at(context, Eigen::VectorXd::Zero(size())); }
 
-PoseEffects CauseEffects::at(const PoseContext& context, const Eigen::VectorXd& numbers) const {
+Eigen::VectorXd CauseEffects::values_at(const Eigen::VectorXd& numbers) const {
   Eigen::VectorXd values = model_.values;
   for (std::size_t k = 0; k < place_.size(); ++k) {  // two causes may have one place
     const auto column = static_cast<Index>(k);
     values(place_[k]) += numbers(column) * scale_(column);
   }
+  return values;
+}
+
+Eigen::MatrixXd CauseEffects::by_warmth(const PoseContext& context, const Eigen::VectorXd& values) const {
+  PoseContext learned = context;
+  learned.temperature = learned_at_.value_or(kOfDrawings);
+  PoseContext now = is_warmth_recorded_ ? context : learned;
+  if (!is_warmth_recorded_) *now.temperature += kUnrecorded;
+  Pose unused = Pose::Identity();
+  return jacobian_at(now, values, &unused)(Eigen::all, warm_) -
+         jacobian_at(learned, values, &unused)(Eigen::all, warm_);
+}
+
+PoseEffects CauseEffects::at(const PoseContext& context, const Eigen::VectorXd& numbers) const {
+  const Eigen::VectorXd values = values_at(numbers);
   Pose X_WT = Pose::Identity();
   Eigen::MatrixXd jacobian = jacobian_at(context, values, &X_WT);
-  if (!warm_.empty() && (learned_at_ || !is_warmth_recorded_)) {
-    PoseContext learned = context;
-    learned.temperature = learned_at_.value_or(kOfDrawings);
-    PoseContext warmer = learned;
-    *warmer.temperature += kUnrecorded;
-    Pose unused = Pose::Identity();
-    const auto by_warmth = [&](const PoseContext& c) {
-      return jacobian_at(c, values, &unused)(Eigen::all, warm_).eval();
-    };
-    if (!is_warmth_recorded_) jacobian(Eigen::all, warm_) = by_warmth(warmer);
-    jacobian(Eigen::all, warm_) -= by_warmth(learned);
-  }
+  if (!warm_.empty() && (learned_at_ || !is_warmth_recorded_)) jacobian(Eigen::all, warm_) = by_warmth(context, values);
+  return in_base(X_WT, jacobian);
+}
+
+PoseEffects CauseEffects::without_warmth(const PoseContext& context, const Eigen::VectorXd& numbers) const {
+  Pose X_WT = Pose::Identity();
+  Eigen::MatrixXd jacobian = jacobian_at(context, values_at(numbers), &X_WT);
+  jacobian(Eigen::all, warm_).setZero();
+  return in_base(X_WT, jacobian);
+}
+
+PoseEffects CauseEffects::in_base(const Pose& X_WT, const Eigen::MatrixXd& jacobian_W) const {
   const Matrix3 R_BW = model_.X_WB.linear().transpose();
   PoseEffects effects;
   effects.X_BT = model_.X_WB.inverse() * X_WT;
   effects.by_cause.resize(6, size());
-  effects.by_cause.topRows<3>() = R_BW * jacobian.topRows<3>();
-  effects.by_cause.bottomRows<3>() = R_BW * jacobian.bottomRows<3>();
+  effects.by_cause.topRows<3>() = R_BW * jacobian_W.topRows<3>();
+  effects.by_cause.bottomRows<3>() = R_BW * jacobian_W.bottomRows<3>();
   effects.by_cause *= scale_.asDiagonal();
   effects.by_base << Matrix3::Identity(), -skew(effects.X_BT.translation()), Matrix3::Zero(), Matrix3::Identity();
   return effects;

@@ -61,6 +61,8 @@ class CauseEffects {
   [[nodiscard]] PoseEffects at(const PoseContext& context) const;
   /// Where the causes have these numbers (K, in units of their prior scales).
   [[nodiscard]] PoseEffects at(const PoseContext& context, const Eigen::VectorXd& numbers) const;
+  /// The same with the columns of warmth 0: a third of the work where no temperature is recorded.
+  [[nodiscard]] PoseEffects without_warmth(const PoseContext& context, const Eigen::VectorXd& numbers) const;
 
  private:
   /// One number of a source, which gets a column.
@@ -74,8 +76,13 @@ class CauseEffects {
   /// The source of that cause in the model, which gets it where it has none; null where the cell cannot have it.
   [[nodiscard]] ErrorSourcePtr source_of(const CauseRecord& record, int joint);
   void find_places();
+  /// Of the model with these numbers of the causes.
+  [[nodiscard]] Eigen::VectorXd values_at(const Eigen::VectorXd& numbers) const;
   [[nodiscard]] Eigen::MatrixXd jacobian_at(const PoseContext& context, const Eigen::VectorXd& values,
                                             Pose* X_WT) const;
+  /// 6 x W: the columns of warmth.
+  [[nodiscard]] Eigen::MatrixXd by_warmth(const PoseContext& context, const Eigen::VectorXd& values) const;
+  [[nodiscard]] PoseEffects in_base(const Pose& X_WT, const Eigen::MatrixXd& jacobian_W) const;
 
   PhysicalModel model_;
   std::optional<double> learned_at_;

@@ -9,6 +9,7 @@
 
 #include "server/base/units.h"
 #include "tests/support/checked_robot.h"
+#include "tests/support/demand.h"
 #include "tests/support/figure.h"
 #include "tests/support/remastered.h"
 
@@ -161,34 +162,89 @@ void sizes(const CheckedRobot& robot, int each) {
   test::tell_figure("health: stated smallest effect off by at most, %", 100 * farthest);
 }
 
-/// A quarter each by 6, 8, 12 and 20 poses: planned, and every second time as the training had them.
+/// What checks say of worlds of lost zeros.
+struct Lost {
+  int worlds = 0, named = 0, whole = 0, sure_and_wrong = 0;
+
+  void add(const std::string& kind, const test::Remastered& world, const Result<HealthCheck>& check) {
+    ++worlds;
+    const bool right = check && test::is_right(*check, world);
+    named += right ? 1 : 0;
+    whole += right && test::joints_of(check->changed.front().zeros) == world.joints ? 1 : 0;
+    const bool wrong = check && !right && test::is_sure(*check);
+    sure_and_wrong += wrong ? 1 : 0;
+    if (right) return;
+    fmt::print("  {}{}, joints {} by {:.4f} rad{}: {}\n", wrong ? "SURE AND WRONG: " : "", kind,
+               fmt::join(world.joints, " "), fmt::join(world.by, " "), world.tool ? ", tool" : "",
+               check ? check->sentence : check.error().message);
+    std::cout.flush();
+  }
+  void add(const Lost& other) {
+    worlds += other.worlds;
+    named += other.named;
+    whole += other.whole;
+    sure_and_wrong += other.sure_and_wrong;
+  }
+  void tell(const std::string& kind) const {
+    fmt::print("lost zeros, {}: {} worlds, {} named, {} of them all, {} sure and wrong\n", kind, worlds, named, whole,
+               sure_and_wrong);
+    std::cout.flush();
+  }
+};
+
+/// Poses as planned for checks, and every second time as the training had them.
+Lost planned_and_spread(bool orientation, int poses, int worlds) {
+  const CheckedRobot planned = test::trained_robot({.seed = 11, .poses = 150, .orientation = orientation}, poses);
+  const std::string kind = fmt::format("{} {}", poses, orientation ? "poses" : "positions");
+  hidden::Random random(static_cast<std::uint64_t>(poses));
+  Lost lost;
+  for (int k = 0; k < worlds; ++k) {
+    CheckedRobot robot = planned;
+    for (std::size_t i = 0; k % 2 == 1 && i < robot.planned.size(); ++i)
+      robot.planned[i] = robot.robot.world.poses[(static_cast<std::size_t>(k) * 7 + i) % 150].q;
+    const test::Remastered world = test::draw_remastered(test::sets_of_six_axes(), random);
+    lost.add(kind + (k % 2 == 1 ? ", spread" : ", planned"), world,
+             checked(robot, {effects_of(world, robot, random)}, random(), {}));
+  }
+  lost.tell(kind);
+  return lost;
+}
+
+/// Elbows of one pose of the flange, another one for each world.
+Lost at_elbows(const CompensatedModel& model, bool orientation, int poses, int worlds) {
+  const std::string kind = fmt::format("{} elbows, {}", poses, orientation ? "poses" : "positions");
+  hidden::Random random(static_cast<std::uint64_t>(100 + poses));
+  Lost lost;
+  for (int k = 0; k < worlds; ++k) {
+    JointVector like(7);
+    like << 0.2, 0.6, 0, -1.4, 0, 1.0, 0.1;
+    for (Eigen::Index j = 0; j < like.size(); ++j) like(j) += hidden::uniform(random, -0.25, 0.25);
+    test::PlainCheck check{test::elbows(test::iiwa(), poses, like), JointVector::Zero(7), orientation};
+    check.seed = random();
+    const test::Remastered world = test::draw_remastered(test::sets_of_seven_axes(), random);
+    apply(world, check, random);
+    const CheckedBatch batch =
+        test::demand(check_against_cell(measured(test::iiwa(), check), model.cell(), drawn(0, 1)));
+    lost.add(kind, world, check_health(model, batch, {}));
+  }
+  lost.tell(kind);
+  return lost;
+}
+
+/// Two worlds in three by an arm of six axes, the others at elbows of one of seven.
 void remastered(int worlds) {
-  int named = 0, whole = 0, sure_and_wrong = 0;
+  Lost all;
+  const CompensatedModel seven = test::trained(test::iiwa());
   for (const bool orientation : {true, false}) {
     for (const int poses : {6, 8, 12, 20}) {
-      const CheckedRobot planned = test::trained_robot({.seed = 11, .poses = 150, .orientation = orientation}, poses);
-      hidden::Random random(static_cast<std::uint64_t>(poses));
-      for (int k = 0; k < worlds / 8; ++k) {
-        CheckedRobot robot = planned;
-        for (std::size_t i = 0; k % 2 == 1 && i < robot.planned.size(); ++i)
-          robot.planned[i] = robot.robot.world.poses[(static_cast<std::size_t>(k) * 7 + i) % 150].q;
-        const test::Remastered world = test::draw_remastered(robot, random);
-        const HealthCheck check = checked(robot, {world.effects}, random(), {});
-        const bool right = test::is_right(check, world);
-        named += right ? 1 : 0;
-        whole += right && test::joints_of(check.changed.front().zeros) == world.joints ? 1 : 0;
-        if (right || !test::is_sure(check)) continue;
-        ++sure_and_wrong;
-        fmt::print("  joints {}{}, {} poses: {}\n", fmt::join(world.joints, " "), world.tool ? ", tool" : "", poses,
-                   check.sentence);
-      }
-      fmt::print("lost zeros, {} poses{}: so far {} named, {} of them all, {} sure and wrong\n", poses,
-                 orientation ? "" : ", positions", named, whole, sure_and_wrong);
-      std::cout.flush();
+      all.add(planned_and_spread(orientation, poses, worlds / 12));
+      all.add(at_elbows(seven, orientation, poses, worlds / 8 - worlds / 12));
     }
   }
-  test::tell_figure("health: lost zeros named, %", 100.0 * named / (worlds / 8 * 8));
-  test::tell_figure("health: lost zeros sure and wrong", sure_and_wrong);
+  all.tell("all");
+  test::tell_figure("health: worlds of lost zeros", all.worlds);
+  test::tell_figure("health: lost zeros named, %", 100.0 * all.named / all.worlds);
+  test::tell_figure("health: lost zeros sure and wrong", all.sure_and_wrong);
 }
 
 void run(const Options& options, int size_trials) {

@@ -3,7 +3,33 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/units.h"
+
 namespace trammel::test {
+
+Remastered draw_remastered(const std::vector<std::vector<int>>& joints, hidden::Random& random) {
+  constexpr double kLeast = 2e-4, kMost = 9e-2;  // rad
+  std::uniform_real_distribution<double> logarithm(std::log(kLeast), std::log(kMost)), share(0.3, 1.0);
+  Remastered world;
+  world.joints = joints[random() % joints.size()];
+  world.tool = random() % 4 == 0;
+  const double largest = std::exp(logarithm(random));
+  for (std::size_t k = 0; k < world.joints.size(); ++k)
+    world.by.push_back((random() % 2 == 0 ? 1 : -1) * std::max(kLeast, share(random) * largest));
+  return world;
+}
+
+const std::vector<std::vector<int>>& sets_of_six_axes() {
+  static const std::vector<std::vector<int>> all = {{2, 3, 4, 5}, {4, 5, 6},         {2, 3}, {2, 3, 4, 5, 6}, {3, 5},
+                                                    {3, 4},       {1, 2, 3, 4, 5, 6}};
+  return all;
+}
+
+const std::vector<std::vector<int>>& sets_of_seven_axes() {
+  static const std::vector<std::vector<int>> all = {{5, 6, 7}, {3, 4},          {2, 4},
+                                                    {4, 6},    {2, 3, 4, 5, 6}, {2, 3, 4, 5, 6, 7}};
+  return all;
+}
 
 hidden::Effect zero_off(const CheckedRobot& robot, int joint, double rad) {
   hidden::Random random(5);
@@ -12,19 +38,18 @@ hidden::Effect zero_off(const CheckedRobot& robot, int joint, double rad) {
   return effect;
 }
 
-Remastered draw_remastered(const CheckedRobot& robot, hidden::Random& random) {
-  static const std::vector<std::vector<int>> kJoints = {{2, 3, 4, 5},    {4, 5, 6}, {2, 3},
-                                                        {2, 3, 4, 5, 6}, {3, 5},    {3, 4}};
-  std::uniform_real_distribution<double> logarithm(std::log(2e-4), std::log(9e-2)), share(0.3, 1.0);
-  Remastered world;
-  world.joints = kJoints[random() % kJoints.size()];
-  world.tool = random() % 4 == 0;
-  const double largest = std::exp(logarithm(random));
-  for (const int joint : world.joints)
-    world.effects.push_back(zero_off(robot, joint, (random() % 2 == 0 ? 1 : -1) * share(random) * largest));
-  if (world.tool)
-    world.effects.push_back(changed_by(robot.robot, {"tool_changed", 0, "", 0, {}, 0}, 1.0, false, random));
-  return world;
+std::vector<hidden::Effect> effects_of(const Remastered& world, const CheckedRobot& robot, hidden::Random& random) {
+  std::vector<hidden::Effect> effects;
+  for (std::size_t k = 0; k < world.joints.size(); ++k)
+    effects.push_back(zero_off(robot, world.joints[k], world.by[k]));
+  if (world.tool) effects.push_back(changed_by(robot.robot, {"tool_changed", 0, "", 0, {}, 0}, 1.0, false, random));
+  return effects;
+}
+
+void apply(const Remastered& world, PlainCheck& check, hidden::Random& random) {
+  for (std::size_t k = 0; k < world.joints.size(); ++k) check.zeros(world.joints[k] - 1) += world.by[k];
+  const Vector3 knocked(hidden::normal(random), hidden::normal(random), hidden::normal(random));
+  if (world.tool) check.tool += from_mm(1) * knocked.normalized();
 }
 
 std::vector<int> joints_of(const std::vector<LostZero>& zeros) {

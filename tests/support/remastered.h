@@ -3,19 +3,29 @@
 #include <vector>
 
 #include "tests/support/checked_robot.h"
+#include "tests/support/plain_arm.h"
 
 /// Robots whose joints lost their zeros, and what a check may say of them.
 namespace trammel::test {
 
 struct Remastered {
   std::vector<int> joints;  ///< 1-based, rising
-  bool tool = false;        ///< was knocked as well
-  std::vector<hidden::Effect> effects;
+  std::vector<double> by;   ///< rad, of each
+  bool tool = false;        ///< was knocked by 1 mm as well
 };
+/// One of these sets of joints, each off by 0.2 to 90 mrad, in one world of four with the tool.
+[[nodiscard]] Remastered draw_remastered(const std::vector<std::vector<int>>& joints, hidden::Random& random);
+/// Wrist, elbow, two joints, all that a check can tell, and all six.
+[[nodiscard]] const std::vector<std::vector<int>>& sets_of_six_axes();
+[[nodiscard]] const std::vector<std::vector<int>>& sets_of_seven_axes();
+
 /// The joint (1-based) has lost its zero by that much.
 [[nodiscard]] hidden::Effect zero_off(const CheckedRobot& robot, int joint, double rad);
-/// Two to five zeros of 0.06 to 90 mrad, in one world of four with a tool that is off by 1 mm.
-[[nodiscard]] Remastered draw_remastered(const CheckedRobot& robot, hidden::Random& random);
+/// What changed in the robot of that world.
+[[nodiscard]] std::vector<hidden::Effect> effects_of(const Remastered& world, const CheckedRobot& robot,
+                                                     hidden::Random& random);
+/// The same in a check of a plain arm.
+void apply(const Remastered& world, PlainCheck& check, hidden::Random& random);
 
 /// The joints of lost zeros, 1-based.
 [[nodiscard]] std::vector<int> joints_of(const std::vector<LostZero>& zeros);

@@ -28,12 +28,13 @@ ZerosSearch::ZerosSearch(const CauseEffects& effects, const CheckRows& rows, std
   tool_numbers_ = static_cast<int>(refitted.directions(rows.by_cause(Eigen::all, effects.tool_columns())).cols());
 }
 
-ZerosSearch::Linear ZerosSearch::linear(const VectorXd& at, const Pose& X_BB) const {
+ZerosSearch::Linear ZerosSearch::linear(const VectorXd& at, const Pose& X_BB, bool warmth) const {
   Linear now{VectorXd(rows_.residual.size()), MatrixXd(rows_.by_base.rows(), rows_.by_base.cols()),
              MatrixXd(rows_.by_cause.rows(), rows_.by_cause.cols())};
   for (std::size_t i = 0; i < rows_.poses(); ++i) {
     const Index first = rows_.first[i], count = rows_.count[i];
-    const PoseEffects there = effects_.at(rows_.contexts[i], at);
+    const PoseEffects there =
+        warmth ? effects_.at(rows_.contexts[i], at) : effects_.without_warmth(rows_.contexts[i], at);
     now.by_base.middleRows(first, count) = there.by_base.topLeftCorner(count, now.by_base.cols());
     now.by_cause.middleRows(first, count) = there.by_cause.topRows(count);
     // The model's bias moves with the arm.
@@ -71,7 +72,7 @@ void ZerosSearch::fit(ZerosFit& one) const {
   precision.setConstant(std::pow(kWidest, -2));
   precision.head(static_cast<Index>(one.zeros.size())).setConstant(std::pow(kWidestZero, -2));
   for (int step = 0; step < kMostSteps; ++step) {
-    const Linear now = linear(one.at, one.X_BB);
+    const Linear now = linear(one.at, one.X_BB, false);
     MatrixXd J(now.residual.size(), b + k);
     J << now.by_base, now.by_cause(Eigen::all, one.columns);
     J = factor_.matrixL().solve(J);
@@ -111,7 +112,7 @@ std::vector<ZerosFit> ZerosSearch::all() const {
 }
 
 CheckRows ZerosSearch::around(const ZerosFit& fit) const {
-  Linear there = linear(fit.at, fit.X_BB);
+  Linear there = linear(fit.at, fit.X_BB, true);
   CheckRows rows = rows_;
   rows.residual = there.residual + there.by_cause * fit.at;
   rows.by_base = std::move(there.by_base);

@@ -41,7 +41,8 @@ class ZerosSearch {
     Eigen::VectorXd residual;
     Eigen::MatrixXd by_base, by_cause;
   };
-  [[nodiscard]] Linear linear(const Eigen::VectorXd& at, const Pose& X_BB) const;
+  /// `warmth`: with what it does, which no zero needs.
+  [[nodiscard]] Linear linear(const Eigen::VectorXd& at, const Pose& X_BB, bool warmth) const;
   [[nodiscard]] ZerosFit begun(unsigned chosen, bool tool) const;
   void fit(ZerosFit& one) const;
 

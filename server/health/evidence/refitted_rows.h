@@ -51,6 +51,8 @@ class RefittedRows {
   }
   /// R x r, orthonormal: the directions that columns have left; those that the nuisance makes up for are none.
   [[nodiscard]] Eigen::MatrixXd directions(const Eigen::MatrixXd& columns) const;
+  /// R x r, in their own units: columns that span the same as those.
+  [[nodiscard]] Eigen::MatrixXd kept(const Eigen::MatrixXd& columns) const { return unwhitened(directions(columns)); }
   /// R x k: residuals, or columns, as a generalised least-squares fit of the nuisance leaves them, in their own units.
   [[nodiscard]] Eigen::MatrixXd unwhitened(const Eigen::MatrixXd& left) const;
   /// R x R: their covariance.

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/health/evidence/noisier_rows.h"
 #include "server/health/examination/examination.h"
 #include "server/health/examination/seen_change.h"
 #include "server/numerics/chi_square.h"
@@ -108,11 +109,17 @@ std::optional<std::size_t> Examination::likeliest(const CheckTests& tests, const
   return std::nullopt;
 }
 
+/// Beside all rows being noisier alike, positions alone, or orientations alone.
 bool Examination::is_scatter(std::size_t hypothesis, const CheckTests& tests, const Eigen::VectorXd& left) const {
   const double whole = left.squaredNorm();
   const double rest = whole - (tests.directions()[hypothesis].transpose() * left).squaredNorm();
   const double gained = tests.rows().freedom() * std::log(whole / std::max(rest, kLeastRest * whole));
-  return gained < price(tests.freedom(hypothesis)) + 2 * std::log(static_cast<double>(questions_.causes));
+  const double least = price(tests.freedom(hypothesis)) + 2 * std::log(static_cast<double>(questions_.causes));
+  if (gained < least) return true;
+  if (std::none_of(rows_.count.begin(), rows_.count.end(), [](Index count) { return count > 3; })) return false;
+  const Eigen::MatrixXd& own = questions_.hypotheses[hypothesis].columns;
+  return gained_beside_noise(rows_, covariance_, nuisance_, own, RowKind::kPositions) < least ||
+         gained_beside_noise(rows_, covariance_, nuisance_, own, RowKind::kOrientations) < least;
 }
 
 /// A cause of any form fits nearly anything in part, so it is named only where nothing is left.

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "server/compensate/compensated_model.h"
+
+/// Arms whose lengths are written down here, not read by the project's kinematics, and that are as drawn but for their
+/// zeros.
+namespace trammel::test {
+
+/// m and rad. The second axis of an arm whose second and third axes are parallel has d 0.
+struct PlainLink {
+  double theta = 0, d = 0, a = 0, alpha = 0;
+};
+struct PlainArm {
+  std::string file;  ///< of models/
+  std::vector<PlainLink> links;
+};
+/// Seven axes: KUKA LBR iiwa 7.
+[[nodiscard]] PlainArm iiwa();
+/// Six axes: ABB IRB 120.
+[[nodiscard]] PlainArm irb120();
+
+/// m: the tool's point in the flange, as the model has it.
+[[nodiscard]] Vector3 plain_tool();
+
+/// How the arm is measured, with 0.013 mm and 0.05 mrad of noise an axis.
+struct PlainCheck {
+  std::vector<JointVector> poses;
+  JointVector zeros;  ///< rad, by which the joints are off
+  bool orientation = true;
+  Eigen::Isometry3d X_WB = Eigen::Isometry3d::Identity();
+  Vector3 tool = plain_tool();
+  std::uint64_t seed = 7;
+};
+[[nodiscard]] MeasurementBatch measured(const PlainArm& arm, const PlainCheck& check);
+
+/// On 100 poses, base and geometry identified.
+[[nodiscard]] CompensatedModel trained(const PlainArm& arm);
+
+/// Elbows of one pose of the flange of an arm of seven axes: the third joint turns from -60 to 60 degrees. `like`: the
+/// posture that has it.
+[[nodiscard]] std::vector<JointVector> elbows(const PlainArm& arm, int count, const JointVector& like);
+[[nodiscard]] std::vector<JointVector> elbows(const PlainArm& arm, int count = 14);
+
+}  // namespace trammel::test
