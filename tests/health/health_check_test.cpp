@@ -336,6 +336,22 @@ TEST_F(HealthTest, AnInstrumentThatMeasuresWorseThanItsSigmaSaysIsNoChangeOfTheR
   EXPECT_LE(changed, 1);
 }
 
+TEST_F(HealthTest, PositionsThatAreNoisierThanTheOrientationsBesideThemAreNoChangeOfTheRobot) {
+  const Cell& cell = robot_->model.cell();
+  hidden::Random random(17);
+  std::normal_distribution<double> normal;
+  int sure = 0;
+  for (std::uint64_t seed = 1; seed <= 16; ++seed) {
+    MeasurementBatch batch = test::measured_check(*robot_, {}, seed);
+    for (Measurement& m : batch.measurements)
+      m.p_W += 35e-6 * Vector3(normal(random), normal(random), normal(random));  // thrice the stated sigma in all
+    const HealthCheck check =
+        check_health(robot_->model, check_against_cell(batch, cell).value(), tolerance_mm(0.05)).value();
+    sure += test::is_sure(check) ? 1 : 0;
+  }
+  EXPECT_EQ(sure, 0);
+}
+
 TEST_F(HealthTest, LengthsThatAreAllTooLongAreAWarmArmOrTheInstrumentAndNoLink) {
   const Cell& cell = robot_->model.cell();
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
