@@ -11,6 +11,7 @@
 #include "server/calibrate/identify_sessions.h"
 #include "server/calibrate/jump.h"
 #include "server/calibrate/one_session.h"
+#include "server/compensate/budget/error_budget.h"
 #include "server/diagnose/families/candidates.h"
 #include "server/diagnose/search/search.h"
 #include "server/diagnose/tell/answers.h"
@@ -233,6 +234,15 @@ void tell_provenance(const Cell& cell, const CheckedBatch& batch, std::uint64_t 
   diagnosis.seed = seed;
 }
 
+/// Where the error of the drawing comes from: by what the cell lists, and the geometry in any case.
+void tell_budget(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch, Diagnosis& diagnosis) {
+  std::vector<std::string> sources = with_unknown_frames(*cell);
+  const std::string geometry(cause_correcting(causes::Part::kLinks).spelling);
+  if (std::find(sources.begin(), sources.end(), geometry) == sources.end()) sources.push_back(geometry);
+  const Result<CalibrationResult> found = calibrate(cell, sources, batch, {.held = {}, .weigh_links = true});
+  if (found) diagnosis.budget = error_budget(*found, batch);
+}
+
 Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                             const DiagnoseOptions& options) {
   const Result<Placed> together = placed(cell, batch, options);
@@ -271,6 +281,7 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
   steps.push_back({"looking at what is left", 0.95, [&] {
                      tell_left_over(explained, options.seed, diagnosis);
                      tell_limits(explained, *prepared, as_recorded(prepared->surrogates, found.all), diagnosis);
+                     tell_budget(cell, prepared->train, diagnosis);
                    }});
   if (const Status done = run(steps, options); !done) return tl::make_unexpected(done.error());
   tell_sessions(*together, diagnosis);

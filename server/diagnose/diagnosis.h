@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "server/compensate/budget/budget.h"
 #include "server/compensate/compensated_model.h"
 #include "server/compensate/session_changes.h"
 #include "server/error_sources/catalogue.h"
@@ -176,6 +177,8 @@ struct Diagnosis {
   NextPoses next_poses;
   std::vector<Dependence> leftover;
   std::vector<std::string> limits;  ///< what the batch does not record, and what that rules out
+  /// Where the error of the drawing comes from, by the cell's error sources and the geometry.
+  std::optional<ErrorBudget> budget;
 
   // For the page.
   std::vector<Periodogram> periodograms;

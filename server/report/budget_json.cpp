@@ -1,6 +1,7 @@
 #include "server/report/budget_json.h"
 
 #include "server/base/units.h"
+#include "server/compensate/budget/budget_words.h"
 
 namespace trammel {
 
@@ -49,6 +50,7 @@ ordered_json budget_json(const ErrorBudget& budget) {
   ordered_json json = json_of(budget.as_it_stands);
   json["poses"] = budget.poses;
   json["beyond_frames"] = json_of(budget.beyond_frames);
+  json["sentences"] = in_words(budget);
   return json;
 }
 

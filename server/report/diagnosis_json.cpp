@@ -3,6 +3,7 @@
 #include "server/base/units.h"
 #include "server/diagnose/tell/wording.h"
 #include "server/measurement/pose_columns.h"
+#include "server/report/budget_json.h"
 #include "server/report/figures_json.h"
 #include "server/report/session_changes_json.h"
 
@@ -191,6 +192,7 @@ ordered_json diagnosis_json(const Diagnosis& diagnosis) {
           {"next_poses_for", next_poses_worth_json(diagnosis)},
           {"leftover", leftover_json(diagnosis.leftover)},
           {"limits", diagnosis.limits},
+          {"budget", diagnosis.budget ? budget_json(*diagnosis.budget) : ordered_json(nullptr)},
           {"waterfall", waterfall_json(diagnosis.waterfall)},
           {"error_sources_before", diagnosis.sources_before},
           {"error_sources_after", diagnosis.sources_after},

@@ -9,10 +9,11 @@
 #include "server/measurement/pose_columns.h"
 #include "server/report/diagnosis_charts.h"
 #include "server/report/embedded.h"
+#include "server/report/budget_page.h"
 #include "server/report/html.h"
 #include "server/report/page_parts.h"
 #include "server/report/pages_beside.h"
-#include "server/report/shown_value.h"
+#include "server/base/shown_value.h"
 #include "server/robot/cell_papers.h"
 
 namespace trammel {
@@ -338,6 +339,7 @@ std::string diagnosis_page(const Diagnosis& diagnosis, const Cell& cell) {
                   {"findings", findings_text(diagnosis)},
                   {"unexplained", unexplained_text(diagnosis)},
                   {"figures", figures_table(diagnosis)},
+                  {"budget", budget_section(diagnosis.budget)},
                   {"confusion", not_separable_text(diagnosis)},
                   {"next_poses", next_poses_text(diagnosis, cell)},
                   {"unseen", unseen_text(diagnosis)},

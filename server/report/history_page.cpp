@@ -11,7 +11,7 @@
 #include "server/report/page_parts.h"
 #include "server/report/pages_beside.h"
 #include "server/report/plain_page.h"
-#include "server/report/shown_value.h"
+#include "server/base/shown_value.h"
 
 namespace trammel {
 

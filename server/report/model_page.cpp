@@ -12,6 +12,7 @@
 #include "server/error_sources/cause_words.h"
 #include "server/measurement/pose_columns.h"
 #include "server/report/embedded.h"
+#include "server/report/budget_page.h"
 #include "server/report/html.h"
 #include "server/report/model_parameters.h"
 #include "server/report/model_poses.h"
@@ -279,6 +280,7 @@ std::string model_page(const CompensatedModel& model, const std::optional<Measur
                   {"compared", html_text(compared.text + bias_note(model.parts()) + reading_note(model))},
                   {"figures", figures_table(compared.evaluation)},
                   {"orientation", orientation_table(compared.evaluation)},
+                  {"budget", budget_section(model.parts().budget)},
                   {"worst", worst_poses(shown)},
                   {"learning", learning_text(curve)},
                   {"provenance", provenance_rows(model, compared.evaluation)},

@@ -5,7 +5,7 @@
 
 #include "server/base/coverage.h"
 #include "server/report/html.h"
-#include "server/report/shown_value.h"
+#include "server/base/shown_value.h"
 
 namespace trammel {
 

@@ -9,7 +9,7 @@
 #include "server/error_sources/spelling.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/report/figures_json.h"
-#include "server/report/shown_value.h"
+#include "server/base/shown_value.h"
 
 namespace trammel::cli {
 
@@ -243,6 +243,15 @@ std::string extended_line(const char* name, const CompensatedModel& model) {
   return figures_line(name, figures_json(model.parts().validation->compensated));
 }
 
+/// Where the error of the drawing comes from.
+std::string budget_text(const ordered_json& budget) {
+  if (budget.is_null()) return "";
+  std::string text;
+  for (const ordered_json& line : budget.at("sentences"))
+    text += fmt::format("{}{}\n", text.empty() ? "" : "  ", line.get<std::string>());
+  return text;
+}
+
 }  // namespace
 
 std::string diagnosis_text(const ordered_json& diagnosis) {
@@ -250,7 +259,7 @@ std::string diagnosis_text(const ordered_json& diagnosis) {
                      diagnosis.at("sentence").get<std::string>()) +
          noise_line(diagnosis) + findings_table(diagnosis.at("findings")) + figures_table(diagnosis) +
          unexplained_text(diagnosis.at("unexplained")) + suspects_text(diagnosis.at("suspect_poses")) +
-         limits_text(diagnosis) + next_poses_text(diagnosis);
+         budget_text(diagnosis.value("budget", ordered_json())) + limits_text(diagnosis) + next_poses_text(diagnosis);
 }
 
 std::string next_poses_csv(const ordered_json& diagnosis) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/shown_value.h"
 #include "server/base/units.h"
 
 namespace trammel {
@@ -13,15 +14,9 @@ namespace {
 
 constexpr double kAlwaysShown = 0.1;  // of the error: a line beyond the first ones that has more is shown as well
 
-/// Two digits of the uncertainty.
-int decimals_for(double u95) {
-  if (!(u95 > 0)) return 4;
-  return std::clamp(1 - static_cast<int>(std::floor(std::log10(u95))), 0, 6);
-}
-
 std::string value_of(const BudgetNumber& value) {
-  const int digits = decimals_for(value.u95);
-  return fmt::format("{:+.{}f} ± {:.{}f} {}", value.value, digits, value.u95, digits, value.unit);
+  const ShownValue read = show_read(value.value, value.u95, {1, value.unit});
+  return fmt::format("{} ± {} {}", read.value, read.expanded, value.unit);
 }
 
 std::string joined(const std::vector<std::string>& all) { return fmt::format("{}", fmt::join(all, ", ")); }

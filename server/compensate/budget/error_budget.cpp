@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "server/base/shown_value.h"
 #include "server/base/units.h"
 #include "server/compensate/budget/effects.h"
 #include "server/compensate/budget/usual.h"
@@ -22,14 +23,11 @@ double inner(const Eigen::Matrix3Xd& one, const Eigen::Matrix3Xd& other) {
   return one.cwiseProduct(other).sum() / static_cast<double>(one.cols());
 }
 
-/// An angle as people read it; other numbers in their own unit.
-struct Shown {
-  double scale = 1;
-  std::string unit;
-};
-Shown shown(const Parameter& parameter) {
-  if (parameter.unit == "rad") return {to_deg(1.0), "deg"};
-  return {parameter.scale, parameter.unit};
+/// A number as people read it: angles in degrees.
+Reading shown(const Parameter& parameter) {
+  Reading reading = reading_of(parameter.unit);
+  reading.scale *= parameter.scale;
+  return reading;
 }
 
 double u95(double variance) { return 2 * std::sqrt(std::max(variance, 0.0)); }

@@ -1,4 +1,4 @@
-#include "server/report/shown_value.h"
+#include "server/base/shown_value.h"
 
 #include <fmt/format.h>
 
