@@ -6,9 +6,9 @@
 #include <cmath>
 #include <map>
 
+#include "server/base/shown_value.h"
 #include "server/base/units.h"
 #include "server/report/html.h"
-#include "server/base/shown_value.h"
 
 namespace trammel {
 
@@ -75,7 +75,8 @@ std::string budget_section(const std::optional<ErrorBudget>& budget) {
   }
   std::string text = fmt::format(
       "<p class=\"note\">The drawing is off by {:.4f} mm rms at {} poses. Touching base and tool frames would leave "
-      "{:.4f} mm. Alone: what a line does to the poses. Shares add to 100 %. Left: what would be left if only this line "
+      "{:.4f} mm. Alone: what a line does to the poses. Shares add to 100 %. Left: what would be left if only this "
+      "line "
       "were put right.{}</p>",
       to_mm(view.error_rms), budget->poses, to_mm(budget->beyond_frames.error_rms),
       small > 0 ? fmt::format(" {} more lines have less than 0.1 %.", small) : "");

@@ -3,17 +3,17 @@
 #include <algorithm>
 #include <iterator>
 
+#include "server/base/shown_value.h"
 #include "server/base/units.h"
 #include "server/diagnose/tell/wording.h"
 #include "server/error_sources/cause_words.h"
 #include "server/measurement/pose_columns.h"
+#include "server/report/budget_page.h"
 #include "server/report/diagnosis_charts.h"
 #include "server/report/embedded.h"
-#include "server/report/budget_page.h"
 #include "server/report/html.h"
 #include "server/report/page_parts.h"
 #include "server/report/pages_beside.h"
-#include "server/base/shown_value.h"
 #include "server/robot/cell_papers.h"
 
 namespace trammel {

@@ -4,6 +4,7 @@
 #include <ctime>
 #include <map>
 
+#include "server/base/shown_value.h"
 #include "server/base/units.h"
 #include "server/report/embedded.h"
 #include "server/report/history.h"
@@ -11,7 +12,6 @@
 #include "server/report/page_parts.h"
 #include "server/report/pages_beside.h"
 #include "server/report/plain_page.h"
-#include "server/base/shown_value.h"
 
 namespace trammel {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "server/base/coverage.h"
-#include "server/report/html.h"
 #include "server/base/shown_value.h"
+#include "server/report/html.h"
 
 namespace trammel {
 

@@ -1,7 +1,7 @@
 #include "server/report/session_changes_json.h"
 
-#include "server/report/html.h"
 #include "server/base/shown_value.h"
+#include "server/report/html.h"
 
 namespace trammel {
 

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/shown_value.h"
 #include "server/base/units.h"
 #include "server/diagnose/diagnosis.h"
 #include "server/diagnose/tell/wording.h"
 #include "server/error_sources/spelling.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/report/figures_json.h"
-#include "server/base/shown_value.h"
 
 namespace trammel::cli {
 
