@@ -9,9 +9,11 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <vector>
 
 #include "server/store/store_init.h"
+#include "tests/support/computing_child.h"
 
 namespace trammel::test {
 namespace {
@@ -42,6 +44,11 @@ std::vector<std::string> as_its_user(std::vector<std::string> command) {
                                     "--pdeathsig=QUIT"};
   whole.insert(whole.end(), command.begin(), command.end());
   return whole;
+}
+
+std::vector<pid_t> children_of(pid_t parent) {
+  std::ifstream listed(fmt::format("/proc/{0}/task/{0}/children", parent));
+  return {std::istream_iterator<pid_t>(listed), {}};
 }
 
 void give_to_its_user(const fs::path& folder) {
@@ -78,7 +85,7 @@ void Postgres::start() { start_until("ready to accept connections"); }
 
 void Postgres::start_until(const std::string& line) {
   auto command = as_its_user({program("postgres"), "-D", data(), "-k", folder_.path().string(), "-c",
-                              "listen_addresses=", "-c", "fsync=off", "-c", "max_connections=60"});
+                              "listen_addresses=", "-c", disk_ == Disk::kWaitedFor ? "fsync=on" : "fsync=off", "-c", "max_connections=60"});
   if (disk_ == Disk::kSmall) {
     // Mounted for the server alone: it goes with it.
     constexpr const char* kMounted =
@@ -105,11 +112,20 @@ void Postgres::stop() {
   server_.reset();
 }
 
+void Postgres::kill() {
+  const std::vector<pid_t> children = children_of(server_->pid());
+  server_->signal(SIGKILL);
+  static_cast<void>(server_->wait(kPatience));
+  server_.reset();
+  for (const pid_t child : children) {
+    if (!Watched(child).ends(kPatience)) give_up("a process of the one that was killed does not end");
+  }
+}
+
 void Postgres::freeze(bool frozen) const {
   const int number = frozen ? SIGSTOP : SIGCONT;
-  std::ifstream children(fmt::format("/proc/{0}/task/{0}/children", server_->pid()));
   if (frozen) server_->signal(number);
-  for (pid_t child = 0; children >> child;) ::kill(child, number);
+  for (const pid_t child : children_of(server_->pid())) ::kill(child, number);
   if (!frozen) server_->signal(number);
 }
 

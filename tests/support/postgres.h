@@ -14,8 +14,9 @@ class Postgres {
  public:
   /// Started when it is asked for first.
   static Postgres& of_program();
-  /// kSmall: it also has a disk of 64 MB, the tablespace `small` with a ballast of 16 MB.
-  enum class Disk { kOwn, kSmall };
+  /// kWaitedFor: a commit is on the disk when it is acknowledged. kSmall: it also has a disk of 64 MB, the tablespace
+  /// `small` with a ballast of 16 MB.
+  enum class Disk { kOwn, kWaitedFor, kSmall };
   explicit Postgres(Disk disk = Disk::kOwn);
   ~Postgres();
   Postgres(const Postgres&) = delete;
@@ -31,6 +32,8 @@ class Postgres {
 
   void start();
   void stop();
+  /// SIGKILL for the one that has started all the others, which end by themselves; until none is left.
+  void kill();
   /// From now on it answers, and takes no change: the standby of nobody.
   void become_standby();
   /// Takes the ballast from the small disk.
@@ -41,9 +44,13 @@ class Postgres {
  private:
   [[nodiscard]] std::string data() const { return folder_.file("data"); }
 
+<<<<<<< HEAD
   [[nodiscard]] std::string small_disk() const { return folder_.file("small"); }
   void start_until(const std::string& line);
 
+=======
+  const Disk disk_;
+>>>>>>> 42bf95e3 (A fleet is killed under load, and what its clients were told is checked for one order that explains it)
   TemporaryFolder folder_;
   const Disk disk_;
   std::optional<Process> server_;

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <fstream>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "server/base/result.h"
+
+/// What clients asked and were answered, for tests/faults/history/history_check.py: a JSON object a line.
+namespace trammel::test {
+
+/// Microseconds by a clock that all processes of this host have.
+[[nodiscard]] std::int64_t monotonic_us();
+
+/// Thread-safe.
+class History {
+ public:
+  explicit History(const std::string& path) : out_(path) {}
+
+  void add(const nlohmann::json& record);
+
+  /// Calls `call`, whose Result<nlohmann::json> holds what the record is to have besides, and adds the record with when
+  /// that was and how it was answered. Returns the answer: `ok`, `conflict`, `not_found`, `refused`, or `unknown` where
+  /// it may have been made or not.
+  template <typename Call>
+  std::string ask(nlohmann::json record, const Call& call) {
+    record["invoke"] = monotonic_us();
+    const Result<nlohmann::json> answered = call();
+    record["complete"] = monotonic_us();
+    if (answered) {
+      record.update(*answered);
+      record["answer"] = "ok";
+    } else {
+      add_error(record, answered.error());
+    }
+    add(record);
+    return record["answer"];
+  }
+
+ private:
+  static void add_error(nlohmann::json& record, const Error& error);
+
+  std::mutex mutex_;
+  std::ofstream out_;
+};
+
+}  // namespace trammel::test

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/support/daemon.h"
+#include "tests/support/fleet_client.h"
+#include "tests/support/postgres.h"
+
+/// A database, two servers and a training host that are killed and stopped under load.
+namespace trammel::test {
+
+struct KillPlan {
+  int kills = 200;
+  std::uint64_t seed = 1;
+  std::chrono::milliseconds longest_pause{2500};  ///< between two kills
+  std::chrono::seconds quiet{10};                 ///< how long it is measured without load, and with load alone
+  int batches = 40;                               ///< of a cell, at most
+  std::chrono::seconds until_jobs_end{300};       ///< after the last kill
+};
+
+struct KillOutcome {
+  std::map<std::string, int> kills;  ///< by what was killed or stopped
+  int predictions = 0, failed = 0;   ///< while there were kills
+  double p99_quiet_ms = 0, p99_load_ms = 0, p99_kills_ms = 0;
+  std::vector<double> after_database_s, after_server_s;  ///< from the loss until a change was acknowledged again
+  std::vector<double> after_ready_s;                     ///< from when the database was back
+  int given_up = 0;                                      ///< jobs that three servers died of
+  int served_otherwise = 0;                              ///< servers that in the end do not serve what is in force
+  bool trail_whole = false;
+};
+
+/// Runs the plan, writes the history to that file, and says what it is like besides.
+[[nodiscard]] KillOutcome kill_a_fleet(const KillPlan& plan, const std::string& history);
+
+/// What history_check.py prints of it, and its exit code.
+[[nodiscard]] Finished check_history(const std::string& history);
+
+}  // namespace trammel::test
