@@ -18,6 +18,7 @@ namespace trammel {
 namespace {
 
 constexpr std::size_t kMostToServe = 100;  // versions that are looked at to serve a cell with
+constexpr std::size_t kWholeWay = 1'000'000;
 
 /// A row of the cell's history of models in force.
 struct Activation {
@@ -26,34 +27,42 @@ struct Activation {
   std::optional<std::int64_t> back;
 };
 
-std::optional<Activation> activation_of(Rows row) {
-  if (!row.next()) return std::nullopt;
-  Activation activation{row.integer64(0), row.integer(1), std::nullopt};
-  if (!row.is_null(2)) activation.back = row.integer64(2);
-  return activation;
+std::optional<Activation> next_activation(Rows& rows) {
+  if (!rows.next()) return std::nullopt;
+  return Activation{rows.integer64(0), rows.integer(1), optional_integer(rows, 2)};
 }
+
+std::optional<Activation> activation_of(Rows row) { return next_activation(row); }
 
 std::optional<Activation> present_activation(Database& database, const std::string& cell) {
   return activation_of(prepare(
       database, "SELECT number, version, back FROM activations WHERE cell = $1 ORDER BY number DESC LIMIT 1", cell));
 }
 
+/// Adds what is in force and where rollbacks lead from there, the next one first. What comes before a damage is added.
+void add_way_back(Database& database, const std::string& cell, std::size_t most, std::vector<Activation>& way) {
+  Rows rows = prepare(database,
+                      "WITH RECURSIVE way (number, version, back, step) AS ("
+                      "SELECT * FROM (SELECT number, version, back, 1 FROM activations WHERE cell = $1 "
+                      "ORDER BY number DESC LIMIT 1) AS present UNION ALL "
+                      "SELECT a.number, a.version, a.back, step + 1 FROM way JOIN activations AS a "
+                      "ON a.number = way.back WHERE step < $2) SELECT number, version, back FROM way",
+                      cell, static_cast<std::int64_t>(most));
+  while (auto activation = next_activation(rows)) way.push_back(*activation);
+}
+
 /// The activations that repeated rollbacks restore, the next one first.
 Result<std::vector<Activation>> activations_before(Database& database, const std::string& cell) {
-  const auto present = present_activation(database, cell);
-  if (!present) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell).of("cell").with_text(cell);
-  if (!present->back) {
-    return failure(ErrorCode::kNotFound, "cell {}: no model was in force before version {}", cell, present->version)
+  std::vector<Activation> way;
+  add_way_back(database, cell, kWholeWay, way);
+  if (way.empty()) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell).of("cell").with_text(cell);
+  if (way.size() == 1) {
+    return failure(ErrorCode::kNotFound, "cell {}: no model was in force before version {}", cell, way.front().version)
         .of("version")
-        .with_value(present->version);
+        .with_value(way.front().version);
   }
-  std::vector<Activation> before;
-  for (auto back = present->back; back; back = before.back().back) {
-    before.push_back(
-        activation_of(prepare(database, "SELECT number, version, back FROM activations WHERE number = $1", *back))
-            .value());
-  }
-  return before;
+  way.erase(way.begin());
+  return way;
 }
 
 void insert_activation(Database& database, const std::string& cell, int version,
@@ -327,6 +336,20 @@ Result<std::optional<int>> Store::version_in_force(const std::string& cell) cons
   });
 }
 
+Result<std::map<std::string, int>> Store::versions_in_force() const {
+  return connection_->exclusively([](Database& database) -> Result<std::map<std::string, int>> {
+    // A look into the index for each cell, and not the whole history.
+    Rows rows = prepare(database,
+                        "SELECT cell, (SELECT version FROM activations WHERE activations.cell = cells.cell "
+                        "ORDER BY number DESC LIMIT 1) FROM cells");
+    std::map<std::string, int> versions;
+    while (rows.next()) {
+      if (!rows.is_null(1)) versions[rows.text(0)] = rows.integer(1);
+    }
+    return versions;
+  });
+}
+
 void Store::copy_after_change(const std::string& cell) const {
   // What was changed is stored: a copy that fails only makes the next fault worse.
   if (const Status copied = copy_model_in_force(cell); !copied)
@@ -360,13 +383,8 @@ std::vector<int> Store::versions_to_serve(const std::string& cell) const {
   const auto copies = connection_->copies->of(cell);
   std::vector<Activation> known;
   const Status read = connection_->exclusively([&](Database& database) -> Status {
-    auto at = present_activation(database, cell);
-    while (at && known.size() < kMostToServe) {
-      known.push_back(*at);
-      if (!at->back) break;
-      at = activation_of(
-          prepare(database, "SELECT number, version, back FROM activations WHERE number = $1", *at->back));
-    }
+    known.clear();  // it may be asked again
+    add_way_back(database, cell, kMostToServe, known);
     return {};
   });
   if (!read) connection_->note_damage(fmt::format("cell {}: its history: {}", cell, sentence(read.error())));

@@ -24,7 +24,7 @@ const std::array<Migration, 2>& migrations() {
             "INSERT INTO trammel_schema (version, works_from) VALUES (0, 0);"
             "INSERT INTO store_identity (id) VALUES (replace(CAST(gen_random_uuid() AS TEXT), '-', ''));",
         1},
-       {kTablesGone, 2}}};
+       {std::string(kTablesGone) + "CREATE INDEX IF NOT EXISTS jobs_by_cell ON jobs (cell, id);", 2}}};
   return all;
 }
 

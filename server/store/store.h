@@ -264,6 +264,8 @@ class Store {
   [[nodiscard]] Result<std::string> model_text(const std::string& cell, int version) const;
   /// Version in force; empty when none is.
   [[nodiscard]] Result<std::optional<int>> version_in_force(const std::string& cell) const;
+  /// The same of every cell that has one, at one moment, by one statement.
+  [[nodiscard]] Result<std::map<std::string, int>> versions_in_force() const;
   /// The versions to serve the cell with, the best first: the one in force, then as rollbacks restore them, then what
   /// only copies have. Those that came after what the store knows come before it. Never fails: empty where there are
   /// none.

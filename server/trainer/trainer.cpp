@@ -81,10 +81,7 @@ void Trainer::set_listeners(ProgressListener progress, ModelListener model, Trou
 
 Result<std::vector<std::string>> Trainer::take_up() {
   TRAMMEL_CHECK(!worker_.joinable() && !taken_up_);
-  std::vector<std::string> notices;
-  for (const auto& [name, cell] : cells()) {
-    if (auto announced = history_.announce_from_store(name); !announced) notices.push_back(sentence(announced.error()));
-  }
+  std::vector<std::string> notices = history_.announce_all();
   const auto until = std::chrono::steady_clock::now() + kLoadingAtStart;
   const ServedCells& served = cells();
   for (auto cell = served.begin(); cell != served.end() && std::chrono::steady_clock::now() < until; ++cell)

@@ -385,6 +385,15 @@ TEST_P(StoreTest, RollsBackFurtherEachTimeAndNeverForth) {
   EXPECT_EQ(in_force(), 1);
 }
 
+TEST_P(StoreTest, SaysOfEveryCellAtOnceWhatIsInForce) {
+  EXPECT_TRUE(store_->versions_in_force()->empty());
+  for (int version = 1; version <= 3; ++version) add_model(version, true);
+  ASSERT_TRUE(store_->add_model("cell-8", test::nominal_model(test::small_cell("cell-8"), 1), 0, true, "made"));
+  ASSERT_TRUE(store_->add_model("cell-9", test::nominal_model(test::small_cell("cell-9"), 1), 0, false, "made"));
+  ASSERT_EQ(store_->rollback("cell-7").value(), 2);
+  EXPECT_EQ(store_->versions_in_force().value(), (std::map<std::string, int>{{"cell-7", 2}, {"cell-8", 1}}));
+}
+
 TEST_P(StoreTest, RollsBackSeveralStepsAtOnceAndNoFurtherThanThereAre) {
   for (int version = 1; version <= 3; ++version) add_model(version, true);
   EXPECT_EQ(store_->rollback("cell-7", 3).error().code, ErrorCode::kNotFound);

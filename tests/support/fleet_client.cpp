@@ -129,7 +129,7 @@ void FleetClient::change(json record, const Call& call) {
   options.id = fmt::format("client-{}-{}", number_, ++changes_);
   record["id"] = options.id;
   if (by_chance(0.6)) {
-    options.expected_version = seen_[record["cell"]].in_force;
+    options.expected_version = seen_[record["cell"].get<std::string>()].in_force;
     record["expected"] = *options.expected_version;
   }
   const std::int64_t until = monotonic_us() + kUntilAnsweredUs;

@@ -5,9 +5,12 @@
 #include <signal.h>
 
 #include <algorithm>
-#include <atomic>
+#include <array>
 #include <filesystem>
+#include <fstream>
+#include <functional>
 #include <sstream>
+#include <utility>
 
 #include "server/base/hash.h"
 #include "server/base/text_file.h"
@@ -376,7 +379,7 @@ class Load {
     for (int i = 0; i < kClients; ++i) {
       const auto at = static_cast<std::size_t>(i);
       clients_.push_back(std::make_unique<FleetClient>(i + 1, options_for(firsts[at], kPatience),
-                                                       options_for({both[(at + 1) % 2]}, kPatience), fleet.cells(),
+                                                       options_for({both[at % 2]}, kPatience), fleet.cells(),
                                                        batches_, history, plan.seed * 100 + at));
     }
   }
@@ -426,7 +429,7 @@ void end(Fleet& fleet, const KillPlan& plan, Load& load, History& history, KillO
   };
   static_cast<void>(wait_until(open_jobs, plan.until_jobs_end));
   for (const AskedCell& cell : fleet.cells()) {
-    for (const std::size_t client : {1, 2}) load.client(client).read_models(cell.name);
+    for (const std::size_t client : {std::size_t{1}, std::size_t{2}}) load.client(client).read_models(cell.name);
     history.add(end_of(fleet, cell.name));
   }
   add_inner_changes(fleet, history);

@@ -48,6 +48,20 @@ Mutex& ModelHistory::changes_of(const std::string& cell) {
   return changing_[cell];
 }
 
+std::vector<std::string> ModelHistory::announce_all() {
+  std::map<std::string, int> in_force;
+  if (store_.is_shared()) in_force = store_.versions_in_force().value_or(std::map<std::string, int>());
+  std::vector<std::string> notices;
+  for (const auto& [name, cell] : cells_.now()) {
+    if (const auto known = in_force.find(name); known != in_force.end()) {
+      registry_.announce(name, known->second);
+    } else if (auto announced = announce_from_store(name); !announced) {
+      notices.push_back(sentence(announced.error()));
+    }
+  }
+  return notices;
+}
+
 ModelHistory::~ModelHistory() { registry_.set_source({}); }
 
 Status ModelHistory::announce_from_store(const std::string& cell) {
@@ -166,6 +180,7 @@ Result<std::pair<int, ServedModelPtr>> ModelHistory::load_first(const std::strin
   for (std::size_t i = 0; i < before.size(); ++i) {
     auto model = registry_.version(cell, before[i]);
     if (model) return std::pair(static_cast<int>(i) + 1, std::move(*model));
+    if (model.error().code == ErrorCode::kBusy) return tl::make_unexpected(model.error());  // it is there, and not now
     if (!why_not) why_not = model.error();
   }
   return tl::make_unexpected(*why_not);
@@ -190,7 +205,12 @@ Result<int> ModelHistory::rollback(const std::string& cell, const ChangeId& id) 
     const bool changed_elsewhere = !restored && restored.error().code == ErrorCode::kConflict && !id.expected_version;
     if (changed_elsewhere) continue;
     if (!restored) return restored;
-    put_in_force(std::move(found->second));
+    // Where others went away from this version and back meanwhile, the way back is another one.
+    if (found->second->version == *restored) {
+      put_in_force(std::move(found->second));
+    } else if (auto other = registry_.version(cell, *restored)) {
+      put_in_force(std::move(*other));
+    }
     return restored;
   }
   return failure(ErrorCode::kBusy, "cell {}: what is in force changes all the time", cell).next("try again later");

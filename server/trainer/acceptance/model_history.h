@@ -71,6 +71,8 @@ class ModelHistory {
   /// loaded, the last one that served before it is, and troubles() says so. One that does not fit the cell is not
   /// served, and nothing in its place.
   [[nodiscard]] Status announce_from_store(const std::string& cell);
+  /// The same for all cells; returns what is wrong, one sentence each.
+  [[nodiscard]] std::vector<std::string> announce_all();
   /// Cells that are not served with the model they should be served with, one sentence each.
   [[nodiscard]] std::vector<std::string> troubles() const;
   /// The same by cell.

@@ -170,6 +170,8 @@ def joined(records):
     for record in records:
         if record["op"] in ("made", "quarantined"):
             operations.append(Operation(record, record["invoke"], FOREVER, True))
+        elif record["answer"] == "refused":
+            continue  # it changed nothing, and says nothing of what is there
         elif record["op"] in CHANGES and record.get("id"):
             by_id[record["id"]].append(record)
         elif record["answer"] == "unknown":
@@ -304,6 +306,8 @@ def check(records):
     check_orders(records, report)
     check_numbers(records, report)
     check_end(records, report)
+    report.figures["refused"] = sum(r.get("answer") == "refused" for r in records)
+    report.figures["unanswered"] = sum(r.get("answer") == "unknown" for r in records)
     predictions = [r for r in records if r["op"] == "predictions"]
     report.figures["predictions"] = sum(r["asked"] for r in predictions)
     failed = sum(r["failed"] for r in predictions)
@@ -312,7 +316,7 @@ def check(records):
     return report
 
 
-GOOD = ("cells", "batches", "jobs", "acknowledged", "predictions")
+GOOD = ("cells", "batches", "jobs", "acknowledged", "unanswered", "refused", "predictions")
 BAD = ("lost", "made twice", "one number two models", "one job two changes", "jobs not ended", "without an order",
        "not decided", "predictions failed")
 

@@ -1,0 +1,60 @@
+// The history of a cell in a record that several servers share, where others are in the way.
+#include <gtest/gtest.h>
+
+#include <chrono>
+
+#include "server/trainer/trainer.h"
+#include "tests/support/demand.h"
+#include "tests/support/postgres.h"
+#include "tests/support/process.h"
+#include "tests/support/small_cell.h"
+
+namespace trammel {
+namespace {
+
+using test::demand;
+
+class SharedHistory : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { test::Postgres::of_program(); }
+  SharedHistory() {
+    for (int poses = 1; poses <= 3; ++poses)
+      EXPECT_TRUE(store_->add_model("cell-7", test::nominal_model(cells_.at("cell-7"), poses), 0, true, "made"));
+    EXPECT_TRUE(demand(trainer_.take_up()).empty());
+  }
+  int served() {
+    const auto model = registry_.in_force("cell-7");
+    return model ? model->version : 0;
+  }
+
+  const std::string url_ = test::Postgres::of_program().new_store();
+  const std::unique_ptr<Store> store_ = demand(Store::open(url_));
+  const ServedCells cells_ = {{"cell-7", test::small_cell("cell-7")}};
+  ModelRegistry registry_;
+  Trainer trainer_{cells_, *store_, registry_, TrainerOptions{}};
+};
+
+TEST_F(SharedHistory, ARollbackStepsPastNoVersionThatOnlyCannotBeReadNow) {
+  ASSERT_TRUE(registry_.version("cell-7", 1));  // in memory, as version 2 is not
+  {
+    test::Process somebody({"/usr/bin/psql", url_, "-v", "ON_ERROR_STOP=1", "-c", "BEGIN", "-c",
+                            "LOCK TABLE models IN ACCESS EXCLUSIVE MODE", "-c", "SELECT 'locked'", "-c",
+                            "SELECT pg_sleep(60)"});
+    ASSERT_TRUE(somebody.wait_for_line("locked", std::chrono::seconds(20)));
+    const auto refused = trainer_.rollback("cell-7", {"r", "roll back cell-7"});
+    ASSERT_FALSE(refused) << "version " << *refused;
+    EXPECT_EQ(refused.error().code, ErrorCode::kBusy);
+  }
+  test::Postgres::of_program().sql(url_, "SELECT pg_terminate_backend(pid) FROM pg_locks WHERE relation = "
+                                         "'models'::regclass AND mode = 'AccessExclusiveLock'");
+  EXPECT_EQ(demand(trainer_.rollback("cell-7", {"r", "roll back cell-7"})), 2);
+  EXPECT_EQ(served(), 2);
+}
+
+TEST_F(SharedHistory, WhatIsInForceOfEachCellIsAnnouncedFromOneLook) {
+  EXPECT_EQ(registry_.version_in_force("cell-7"), 3);
+  EXPECT_EQ(served(), 3);
+}
+
+}  // namespace
+}  // namespace trammel
