@@ -12,7 +12,7 @@ import json
 import sys
 
 FOREVER = float("inf")
-MOST_STEPS = 3_000_000  # of a search, before it is given up
+MOST_STEPS = 300_000  # of a search, before it is given up
 CHANGES = ("activate", "rollback", "release", "discard", "train")
 
 
@@ -26,6 +26,7 @@ class Operation:
     def __init__(self, record, invoke, complete, optional=False):
         self.record, self.invoke, self.complete, self.optional = record, invoke, complete, optional
         self.before = None  # another operation that must not have happened before this one
+        self.hint = FOREVER  # when the record says that it was made
 
     def __str__(self):
         told = {k: v for k, v in self.record.items() if k not in ("invoke", "complete", "versions")}
@@ -33,60 +34,76 @@ class Operation:
         return f"[{self.invoke}..{end}] {json.dumps(told)}{' (may not have happened)' if self.optional else ''}"
 
 
-def find_order(operations, state, step):
+def find_order(operations, state, step, only_reads):
     """None if there is an order, else the operation that none could be found for.
 
-    step(state, record) is the state behind the operation, or None where its answer is not possible in this state."""
-    index = {id(operation): i for i, operation in enumerate(operations)}
-    events = [(o.invoke, 0, i) for i, o in enumerate(operations)]
-    events += [(o.complete, 1, i) for i, o in enumerate(operations) if o.complete != FOREVER]
-    events.sort()
-    # A doubly linked list of events; 0 is its head and its end.
-    count = len(events)
-    following = [(i + 1) % (count + 1) for i in range(count + 1)]
-    preceding = [(i - 1) % (count + 1) for i in range(count + 1)]
-    place = {(kind, i): at + 1 for at, (_, kind, i) in enumerate(events)}
+    step(state, record) is the state behind the operation, or None where its answer is not possible in this state. Whatever only
+    reads is taken as soon as its answer is possible: it can stand in nobody's way. What changes something is tried in the order
+    in which the record says that it was made, if it does: a hint, and no more. What may have happened is tried last. A place
+    that was reached with fewer of these is not tried again: whatever goes on from here went on from there, too."""
+    must = sorted((o for o in operations if not o.optional), key=lambda o: o.invoke)
+    may = sorted((o for o in operations if o.optional), key=lambda o: o.invoke)
+    bit_of = {id(o): 1 << i for i, o in enumerate(must)}
+    bit_of_may = {id(o): 1 << i for i, o in enumerate(may)}
+    tried = collections.defaultdict(list)  # the optional ones that were made, by those that must have been and the state
+    farthest, steps = (-1, None), 0
 
-    def take_out(at):
-        following[preceding[at]], preceding[following[at]] = following[at], preceding[at]
+    def is_too_late(one, done, made):
+        return one.before is not None and (
+            done & bit_of.get(id(one.before), 0) or made & bit_of_may.get(id(one.before), 0))
 
-    def put_back(at):
-        following[preceding[at]] = preceding[following[at]] = at
+    def next_ones(first, done, made, state):
+        """What may be the next: what begins before anything that is left has ended. With the state behind it."""
+        end, left = FOREVER, []
+        for i in range(first, len(must)):
+            if must[i].invoke > end:
+                break
+            if not done >> i & 1:
+                left.append(must[i])
+                end = min(end, must[i].complete)
+        left = [o for o in left if o.invoke <= end]
+        nonlocal farthest
+        if left and end > farthest[0]:
+            farthest = (end, min(left, key=lambda o: o.complete))
+        for o in may:
+            if o.invoke > end:
+                break
+            if not made & bit_of_may[id(o)]:
+                left.append(o)
+        fitting = []
+        for one in left:
+            behind = None if is_too_late(one, done, made) else step(state, one.record)
+            if behind is None:
+                continue
+            if only_reads(one.record) and not one.optional:
+                return iter([(one, behind)])
+            changes_nothing = behind == state and one.hint == FOREVER and not one.optional
+            fitting.append(((not changes_nothing, one.hint, one.optional, one.complete), one, behind))
+        fitting.sort(key=lambda tried: tried[0])
+        return iter([(one, behind) for _, one, behind in fitting])
 
-    done, tried, way, farthest, steps = 0, set(), [], (-1, None), 0
-    at = following[0]
-    while at != 0:
+    everything = (1 << len(must)) - 1
+    way = [(0, 0, 0, next_ones(0, 0, 0, state))]
+    while way:
+        first, done, made, ones = way[-1]
+        if done == everything:
+            return None
+        one, behind = next(ones, (None, None))
+        if one is None:
+            way.pop()
+            continue
         steps += 1
         if steps > MOST_STEPS:
             raise Undecided()
-        _, kind, i = events[at - 1]
-        if kind == 0:
-            before = operations[i].before
-            allowed = before is None or not done >> index[id(before)] & 1
-            behind = step(state, operations[i].record) if allowed else None
-            now = done | 1 << i
-            if behind is not None and (now, behind) not in tried:
-                tried.add((now, behind))
-                way.append((i, state))
-                state, done = behind, now
-                take_out(at)
-                if (1, i) in place:
-                    take_out(place[1, i])
-                at = following[0]
-            else:
-                at = following[at]
+        done, made = done | bit_of.get(id(one), 0), made | bit_of_may.get(id(one), 0)
+        with_fewer = tried[done, behind]
+        if any(before & made == before for before in with_fewer):
             continue
-        if at > farthest[0]:
-            farthest = (at, operations[i])
-        if not way:
-            return farthest[1]
-        i, state = way.pop()
-        done &= ~(1 << i)
-        if (1, i) in place:
-            put_back(place[1, i])
-        put_back(place[0, i])
-        at = following[place[0, i]]
-    return None
+        with_fewer.append(made)
+        while done >> first & 1:
+            first += 1
+        way.append((first, done, made, next_ones(first, done, made, behind)))
+    return farthest[1]
 
 
 class Cell:
@@ -197,6 +214,13 @@ def joined(records):
     return operations, problems
 
 
+def only_reads(record):
+    operation, answer = record["op"], record.get("answer")
+    if operation in ("models", "read") or answer in ("conflict", "not_found"):
+        return True
+    return "of_cell" in record
+
+
 def of_cell(record):
     """Whether the operation tells of what is in force."""
     operation, answer = record["op"], record.get("answer")
@@ -227,22 +251,28 @@ def check_orders(records, report):
     cells, batches = collections.defaultdict(list), collections.defaultdict(list)
     for record in records:
         if of_cell(record):
-            cells[record["cell"]].append(record)
+            only_expects = record["op"] in ("release", "discard", "train")
+            cells[record["cell"]].append({**record, "of_cell": True} if only_expects else record)
         if of_batch(record):
             batches[record["cell"], record["batch"]].append(record)
+    orders = {r["cell"]: {key: at for at, key in enumerate(r.get("order", []))} for r in records if r["op"] == "end"}
     for cell, own in cells.items():
-        check_order(f"cell {cell}", own, Cell.START, Cell().step, report)
+        check_order(f"cell {cell}", own, Cell.START, Cell().step, orders.get(cell, {}), report)
     for (cell, batch), own in batches.items():
-        check_order(f"batch {batch} of cell {cell}", own, ("absent", None, None), step_of_batch, report)
+        check_order(f"batch {batch} of cell {cell}", own, ("absent", None, None), step_of_batch, orders.get(cell, {}), report)
     report.figures["cells"], report.figures["batches"] = len(cells), len(batches)
 
 
-def check_order(what, records, start, step, report):
+def check_order(what, records, start, step, hints, report):
     operations, problems = joined(records)
+    for operation in operations:
+        record = operation.record
+        key = f"version {record['version']}" if record["op"] == "made" else record.get("id")
+        operation.hint = hints.get(key, FOREVER)
     for problem in problems:
         report.add("made twice", problem)
     try:
-        stuck = find_order(operations, start, step)
+        stuck = find_order(operations, start, step, only_reads)
     except Undecided:
         report.undecided = True
         report.add("not decided", f"{what}: {len(operations)} operations")
