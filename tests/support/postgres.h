@@ -44,13 +44,9 @@ class Postgres {
  private:
   [[nodiscard]] std::string data() const { return folder_.file("data"); }
 
-<<<<<<< HEAD
   [[nodiscard]] std::string small_disk() const { return folder_.file("small"); }
   void start_until(const std::string& line);
 
-=======
-  const Disk disk_;
->>>>>>> 42bf95e3 (A fleet is killed under load, and what its clients were told is checked for one order that explains it)
   TemporaryFolder folder_;
   const Disk disk_;
   std::optional<Process> server_;
