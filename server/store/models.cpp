@@ -55,7 +55,8 @@ void add_way_back(Database& database, const std::string& cell, std::size_t most,
 Result<std::vector<Activation>> activations_before(Database& database, const std::string& cell) {
   std::vector<Activation> way;
   add_way_back(database, cell, kWholeWay, way);
-  if (way.empty()) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell).of("cell").with_text(cell);
+  if (way.empty())
+    return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell).of("cell").with_text(cell);
   if (way.size() == 1) {
     return failure(ErrorCode::kNotFound, "cell {}: no model was in force before version {}", cell, way.front().version)
         .of("version")

@@ -1,6 +1,6 @@
-// Two servers and a training host with one PostgreSQL, all of which are killed (SIGKILL) or stopped (SIGSTOP) while four
-// clients submit, train, activate, roll back, release, discard and read, and two more ask for predictions. What they
-// asked and were answered is checked by tests/faults/history/history_check.py.
+// Two servers and a training host with one PostgreSQL, all of which are killed (SIGKILL) or stopped (SIGSTOP) while
+// four clients submit, train, activate, roll back, release, discard and read, and two more ask for predictions. What
+// they asked and were answered is checked by tests/faults/history/history_check.py.
 // --kills N, --seed N, --history FILE to keep it.
 #include <CLI/CLI.hpp>
 #include <algorithm>

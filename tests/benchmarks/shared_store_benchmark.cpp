@@ -53,12 +53,14 @@ void fill(const test::Postgres& database, const std::string& url, int batches) {
   const std::string number = fmt::format("(c - 1) * {} + v", kVersionsOfEach);
   const std::string checks_off = "SET session_replication_role = replica; ";
   database.sql(url, fmt::format("INSERT INTO cells SELECT 'cell-' || c, {} FROM {}", kVersionsOfEach, cells));
-  database.sql(url, fmt::format("{}INSERT INTO models SELECT 'cell-' || c, v, 'id', md5({}::text), 'none', 'b', 0, 300, 0, "
-                                "'x' FROM {}, generate_series(1, {}) AS v",
-                                checks_off, number, cells, kVersionsOfEach));
-  database.sql(url, fmt::format("{}INSERT INTO activations (number, cell, version, back, activated_at) SELECT {}, "
-                                "'cell-' || c, v, CASE WHEN v > 1 THEN {} - 1 END, 0 FROM {}, generate_series(1, {}) AS v",
-                                checks_off, number, number, cells, kVersionsOfEach));
+  database.sql(url,
+               fmt::format("{}INSERT INTO models SELECT 'cell-' || c, v, 'id', md5({}::text), 'none', 'b', 0, 300, 0, "
+                           "'x' FROM {}, generate_series(1, {}) AS v",
+                           checks_off, number, cells, kVersionsOfEach));
+  database.sql(url,
+               fmt::format("{}INSERT INTO activations (number, cell, version, back, activated_at) SELECT {}, "
+                           "'cell-' || c, v, CASE WHEN v > 1 THEN {} - 1 END, 0 FROM {}, generate_series(1, {}) AS v",
+                           checks_off, number, number, cells, kVersionsOfEach));
   const std::string cell = fmt::format("'cell-' || (1 + b % {})", kManyCells);
   const std::string rows = fmt::format("generate_series(1, {}) AS b", batches);
   database.sql(url, fmt::format("{}INSERT INTO jobs (id, cell, level, bias, state, message, created_at, model_version) "
@@ -69,13 +71,14 @@ void fill(const test::Postgres& database, const std::string& url, int batches) {
                                 checks_off, cell, rows));
   database.sql(url, fmt::format("{}INSERT INTO job_batches SELECT b, 0, {}, 'b' || b FROM {}", checks_off, cell, rows));
   for (const char* table : {"jobs", "activations"})
-    database.sql(url, fmt::format("SELECT setval(pg_get_serial_sequence('{0}', '{1}'), (SELECT MAX({1}) FROM {0}))", table,
-                                  table == std::string("jobs") ? "id" : "number"));
+    database.sql(url, fmt::format("SELECT setval(pg_get_serial_sequence('{0}', '{1}'), (SELECT MAX({1}) FROM {0}))",
+                                  table, table == std::string("jobs") ? "id" : "number"));
   database.sql(url, "ANALYZE");
 }
 
 StoredBatch batch_of(const std::string& cell, int number, const std::string& csv) {
-  StoredBatch batch{cell, fmt::format("new-{}", number), csv + fmt::format("# {}\n", number), "", fmt::format("r{}", number)};
+  StoredBatch batch{cell, fmt::format("new-{}", number), csv + fmt::format("# {}\n", number), "",
+                    fmt::format("r{}", number)};
   batch.hash = sha256_hex(batch.csv);
   batch.poses = 300;
   return batch;
@@ -99,9 +102,9 @@ void measure_accepting(const std::string& url) {
 
 /// A server of the shipped cell with that record.
 void configure(const test::Daemon& daemon, const std::string& url, const std::string& keys) {
-  demand_done(write_text_file(daemon.config_path(),
-                              fmt::format("version: 1\nserver: {}\ncells: [cell-7.yaml]\nstore: '{}'\n{}", daemon.name(),
-                                          url, keys)));
+  demand_done(write_text_file(
+      daemon.config_path(),
+      fmt::format("version: 1\nserver: {}\ncells: [cell-7.yaml]\nstore: '{}'\n{}", daemon.name(), url, keys)));
 }
 
 void measure_accepting_by_service(const std::string& url) {
@@ -148,12 +151,13 @@ void measure_start(const std::string& url) {
     }
   }
   demand_done(write_text_file(daemon.config_path(), fmt::format("version: 1\nserver: {}\ncells: [{}]\nstore: '{}'\n",
-                                                            daemon.name(), names, url)));
+                                                                daemon.name(), names, url)));
   for (const char* name : {"the first time", "again"}) {
     const auto begin = Clock::now();
     test::Process process(daemon.command_line());
     if (!process.wait_for_line("ready", kLimit)) fmt::print("not ready: {}\n", process.standard_error());
-    test::tell_figure(fmt::format("shared store: a server of 1,000 cells is ready, {}, s", name), ms_since(begin) / 1000);
+    test::tell_figure(fmt::format("shared store: a server of 1,000 cells is ready, {}, s", name),
+                      ms_since(begin) / 1000);
     process.signal(SIGTERM);
     static_cast<void>(process.wait(kLimit));
   }
@@ -163,10 +167,11 @@ void measure_start(const std::string& url) {
 void measure_claims(const test::Postgres& database, const std::string& url) {
   constexpr int kServers = 4, kOfEach = 250;
   const std::int64_t first = std::stoll(database.sql(
-      url, fmt::format("WITH made AS (INSERT INTO jobs (cell, level, bias, state, message, created_at) SELECT 'claimed-' "
-                       "|| c, '', '', 'queued', '', 0 FROM generate_series(1, {}) AS c RETURNING id) SELECT MIN(id) FROM "
-                       "made",
-                       kServers * kOfEach)));
+      url,
+      fmt::format("WITH made AS (INSERT INTO jobs (cell, level, bias, state, message, created_at) SELECT 'claimed-' "
+                  "|| c, '', '', 'queued', '', 0 FROM generate_series(1, {}) AS c RETURNING id) SELECT MIN(id) FROM "
+                  "made",
+                  kServers * kOfEach)));
   std::vector<std::unique_ptr<Store>> stores;
   for (int i = 0; i < kServers; ++i) {
     stores.push_back(demand(Store::open(url)));
@@ -201,7 +206,8 @@ void measure_serving(const std::string& url) {
   const auto one = demand(client::Session::open(first.session_options()));
   const auto other = demand(client::Session::open(second.session_options()));
   for (const std::uint64_t seed : {1, 2}) {
-    const auto job = demand(one->submit_measurements("cell-7", fmt::format("b{}", seed), test::virtual_batch_csv(60, seed)));
+    const auto job =
+        demand(one->submit_measurements("cell-7", fmt::format("b{}", seed), test::virtual_batch_csv(60, seed)));
     static_cast<void>(demand(one->wait_for_job(job, kLimit, nullptr)));
   }
   client::CallContext context;
@@ -218,8 +224,10 @@ void measure_serving(const std::string& url) {
     }
     times.push_back(ms_since(begin));
   }
-  test::tell_figure("shared store: put in force on one server until another serves it, median, ms", quantile(times, 0.5));
-  test::tell_figure("shared store: put in force on one server until another serves it, longest, ms", quantile(times, 1));
+  test::tell_figure("shared store: put in force on one server until another serves it, median, ms",
+                    quantile(times, 0.5));
+  test::tell_figure("shared store: put in force on one server until another serves it, longest, ms",
+                    quantile(times, 1));
 }
 
 }  // namespace

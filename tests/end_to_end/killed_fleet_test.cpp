@@ -1,7 +1,8 @@
 // The short form of tests/benchmarks/kills_benchmark.cpp.
+#include "tests/support/killed_fleet.h"
+
 #include <gtest/gtest.h>
 
-#include "tests/support/killed_fleet.h"
 #include "tests/support/temporary_folder.h"
 
 namespace trammel {

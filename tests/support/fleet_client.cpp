@@ -106,7 +106,9 @@ void FleetClient::send_batch(const AskedCell& cell, const SharedBatches::Batch& 
     answer = history_.ask(record, [&]() -> Result<json> {
       return session(tries % 2 == 0 ? Server::kFirst : Server::kOther)
           .submit_measurements(cell.name, batch.id, text)
-          .map([](std::int64_t job) { return json{{"value", job}}; });
+          .map([](std::int64_t job) {
+            return json{{"value", job}};
+          });
     });
   }
 }
@@ -135,8 +137,8 @@ void FleetClient::change(json record, const Call& call) {
   const std::int64_t until = monotonic_us() + kUntilAnsweredUs;
   std::string answer = "unknown";
   for (int tries = 0; answer == "unknown" && monotonic_us() < until; ++tries) {
-    answer = history_.ask(
-        record, [&] { return call(session(tries % 2 == 0 ? Server::kFirst : Server::kOther), options); });
+    answer =
+        history_.ask(record, [&] { return call(session(tries % 2 == 0 ? Server::kFirst : Server::kOther), options); });
   }
   if (by_chance(0.15))
     history_.ask(record, [&] { return call(session(by_chance(0.5) ? Server::kFirst : Server::kOther), options); });
@@ -145,8 +147,8 @@ void FleetClient::change(json record, const Call& call) {
 void FleetClient::activate(const AskedCell& cell) {
   const int newest = seen_[cell.name].newest;
   if (newest == 0) return read_models(cell.name);
-  const int version = std::uniform_int_distribution<int>(std::max(1, newest - 3), newest + (by_chance(0.1) ? 5 : 0))(
-      random_);
+  const int version =
+      std::uniform_int_distribution<int>(std::max(1, newest - 3), newest + (by_chance(0.1) ? 5 : 0))(random_);
   json record = record_of("activate", cell.name);
   record["version"] = version;
   change(std::move(record), [&](client::Session& session, const client::ChangeOptions& options) -> Result<json> {
@@ -193,7 +195,9 @@ void FleetClient::read_batch(const AskedCell& cell) {
   history_.ask(record, [&]() -> Result<json> {
     return session(by_chance(0.5) ? Server::kFirst : Server::kOther)
         .export_batch(cell.name, batch->id)
-        .map([](const std::string& text) { return json{{"state", "present"}, {"hash", sha256_hex(text)}}; });
+        .map([](const std::string& text) {
+          return json{{"state", "present"}, {"hash", sha256_hex(text)}};
+        });
   });
 }
 

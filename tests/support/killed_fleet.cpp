@@ -29,10 +29,10 @@ using std::chrono::seconds;
 constexpr int kClients = 4;
 constexpr int kServing = 2;  // servers 0 and 1; the one behind them only trains
 constexpr seconds kLimit{60};
-constexpr milliseconds kPatience{4000};        // of a client's call
+constexpr milliseconds kPatience{4000};  // of a client's call
 constexpr milliseconds kPredictionPatience{5000};
 constexpr milliseconds kBetweenPredictions{20};
-constexpr milliseconds kKnownAgain{2000};      // a server that is back, before the other one's turn
+constexpr milliseconds kKnownAgain{2000};  // a server that is back, before the other one's turn
 constexpr std::int64_t kMillisecondUs = 1000;
 
 const std::vector<std::string> kSmallCells = {"small-1", "small-2"};
@@ -211,8 +211,9 @@ class Fleet {
     const std::size_t other = 1 - std::min<std::size_t>(which, 1);
     const bool is_last = which < kServing && (away_[other] || monotonic_us() < known_at_[other]);
     if (is_last) return false;
-    losses_.push_back({fmt::format("{} {}", which < kServing ? "server" : "training host", freezes ? "stopped" : "killed"),
-                       monotonic_us()});
+    losses_.push_back(
+        {fmt::format("{} {}", which < kServing ? "server" : "training host", freezes ? "stopped" : "killed"),
+         monotonic_us()});
     freezes ? servers_[which].process().signal(SIGSTOP) : servers_[which].kill();
     // Some are away for longer than a claim holds.
     away_[which] = {monotonic_us() + (freezes ? after(seconds(2), seconds(drawn(4) == 0 ? 20 : 6))
@@ -304,11 +305,12 @@ void add_inner_changes(const Fleet& fleet, History& history) {
   const std::int64_t offset =
       std::chrono::duration_cast<std::chrono::microseconds>(since_unix).count() - monotonic_us();
   const auto invoked = [&](const std::string& at) { return 1'000'000 * std::stoll(at) - offset; };
-  for (const auto& row : fleet.rows(
-           "SELECT m.cell, m.version, substr(m.hash, 1, 16), COALESCE(o.verdict, '') = 'in_force', a.at FROM models AS m "
-           "JOIN audit AS a ON a.cell = m.cell AND a.what = 'model' AND a.subject = 'version ' || m.version "
-           "JOIN jobs AS j ON j.cell = m.cell AND j.model_version = m.version "
-           "LEFT JOIN job_outcomes AS o ON o.job = j.id ORDER BY 1, 2"))
+  for (const auto& row :
+       fleet.rows("SELECT m.cell, m.version, substr(m.hash, 1, 16), COALESCE(o.verdict, '') = 'in_force', a.at FROM "
+                  "models AS m "
+                  "JOIN audit AS a ON a.cell = m.cell AND a.what = 'model' AND a.subject = 'version ' || m.version "
+                  "JOIN jobs AS j ON j.cell = m.cell AND j.model_version = m.version "
+                  "LEFT JOIN job_outcomes AS o ON o.job = j.id ORDER BY 1, 2"))
     history.add({{"op", "made"},
                  {"cell", row.at(0)},
                  {"version", std::stoi(row.at(1))},
@@ -316,22 +318,27 @@ void add_inner_changes(const Fleet& fleet, History& history) {
                  {"in_force", row.at(3) == "t"},
                  {"invoke", invoked(row.at(4))}});
   for (const auto& row : fleet.rows("SELECT cell, substr(subject, 7), at FROM audit WHERE what = 'quarantine'"))
-    history.add(
-        {{"op", "quarantined"}, {"cell", row.at(0)}, {"batch", row.at(1)}, {"invoke", invoked(row.at(2))}});
+    history.add({{"op", "quarantined"}, {"cell", row.at(0)}, {"batch", row.at(1)}, {"invoke", invoked(row.at(2))}});
 }
 
 /// What is there in the end, of one cell, as the record says.
 json end_of(const Fleet& fleet, const std::string& cell) {
-  json end = {{"op", "end"}, {"cell", cell}, {"batches", json::object()}, {"jobs", json::object()},
-              {"changes", json::array()}, {"twice", json::array()}};
+  json end = {{"op", "end"},
+              {"cell", cell},
+              {"batches", json::object()},
+              {"jobs", json::object()},
+              {"changes", json::array()},
+              {"twice", json::array()}};
   const std::string of_cell = fmt::format(" WHERE cell = '{}' ", cell);
-  for (const auto& row : fleet.rows("SELECT id, hash FROM batches" + of_cell)) end["batches"][row.at(0)] = {{"hash", row.at(1)}};
+  for (const auto& row : fleet.rows("SELECT id, hash FROM batches" + of_cell))
+    end["batches"][row.at(0)] = {{"hash", row.at(1)}};
   for (const auto& row : fleet.rows("SELECT id, state FROM jobs" + of_cell)) end["jobs"][row.at(0)] = row.at(1);
   for (const auto& row : fleet.rows("SELECT id FROM changes")) end["changes"].push_back(row.at(0));
   for (const auto& row : fleet.rows("SELECT what, subject, request FROM audit" + of_cell +
                                     "AND request <> '' GROUP BY 1, 2, 3 HAVING COUNT(*) > 1"))
     end["twice"].push_back(fmt::format("{}", fmt::join(row, " ")));
-  for (const auto& row : fleet.rows("SELECT subject FROM audit" + of_cell + "AND what = 'batch' GROUP BY 1 HAVING COUNT(*) > 1"))
+  for (const auto& row :
+       fleet.rows("SELECT subject FROM audit" + of_cell + "AND what = 'batch' GROUP BY 1 HAVING COUNT(*) > 1"))
     end["twice"].push_back(row.at(0));
   for (const auto& row : fleet.rows("SELECT substring(after FROM 'of job [0-9]+') FROM audit" + of_cell +
                                     "AND what = 'model' GROUP BY 1 HAVING COUNT(*) > 1"))
@@ -375,12 +382,13 @@ class Load {
  public:
   Load(const Fleet& fleet, const KillPlan& plan, History& history) : batches_(plan.batches) {
     const std::vector<const Daemon*> both = {&fleet.server(0), &fleet.server(1)};
-    const std::array<std::vector<const Daemon*>, kClients> firsts = {both, std::vector{both[0]}, std::vector{both[1]}, both};
+    const std::array<std::vector<const Daemon*>, kClients> firsts = {both, std::vector{both[0]}, std::vector{both[1]},
+                                                                     both};
     for (int i = 0; i < kClients; ++i) {
       const auto at = static_cast<std::size_t>(i);
       clients_.push_back(std::make_unique<FleetClient>(i + 1, options_for(firsts[at], kPatience),
-                                                       options_for({both[at % 2]}, kPatience), fleet.cells(),
-                                                       batches_, history, plan.seed * 100 + at));
+                                                       options_for({both[at % 2]}, kPatience), fleet.cells(), batches_,
+                                                       history, plan.seed * 100 + at));
     }
   }
   void start() {

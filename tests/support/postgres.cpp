@@ -84,8 +84,9 @@ Postgres::~Postgres() { stop(); }
 void Postgres::start() { start_until("ready to accept connections"); }
 
 void Postgres::start_until(const std::string& line) {
-  auto command = as_its_user({program("postgres"), "-D", data(), "-k", folder_.path().string(), "-c",
-                              "listen_addresses=", "-c", disk_ == Disk::kWaitedFor ? "fsync=on" : "fsync=off", "-c", "max_connections=60"});
+  auto command =
+      as_its_user({program("postgres"), "-D", data(), "-k", folder_.path().string(), "-c", "listen_addresses=", "-c",
+                   disk_ == Disk::kWaitedFor ? "fsync=on" : "fsync=off", "-c", "max_connections=60"});
   if (disk_ == Disk::kSmall) {
     // Mounted for the server alone: it goes with it.
     constexpr const char* kMounted =

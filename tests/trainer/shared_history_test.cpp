@@ -45,8 +45,9 @@ TEST_F(SharedHistory, ARollbackStepsPastNoVersionThatOnlyCannotBeReadNow) {
     ASSERT_FALSE(refused) << "version " << *refused;
     EXPECT_EQ(refused.error().code, ErrorCode::kBusy);
   }
-  test::Postgres::of_program().sql(url_, "SELECT pg_terminate_backend(pid) FROM pg_locks WHERE relation = "
-                                         "'models'::regclass AND mode = 'AccessExclusiveLock'");
+  test::Postgres::of_program().sql(url_,
+                                   "SELECT pg_terminate_backend(pid) FROM pg_locks WHERE relation = "
+                                   "'models'::regclass AND mode = 'AccessExclusiveLock'");
   EXPECT_EQ(demand(trainer_.rollback("cell-7", {"r", "roll back cell-7"})), 2);
   EXPECT_EQ(served(), 2);
 }
