@@ -76,6 +76,7 @@ void add_commands(CLI::App& app, Action& chosen) {
   add_apply_commands(app, chosen);
   add_check_command(app, chosen);
   add_diagnose_command(app, chosen);
+  add_remedies_command(app, chosen);
   add_backup_command(app, chosen);
   add_robot_command(app, chosen);
   add_confirm_command(app, chosen);

@@ -50,6 +50,9 @@ ordered_json budget_json(const ErrorBudget& budget) {
   ordered_json json = json_of(budget.as_it_stands);
   json["poses"] = budget.poses;
   json["beyond_frames"] = json_of(budget.beyond_frames);
+  json["remedies"] = ordered_json::array();
+  for (const PutRight& step : budget.put_right)
+    json["remedies"].push_back({{"step", step.step}, {"name", step.name}, {"left_rms_mm", to_mm(step.left_rms)}});
   json["sentences"] = in_words(budget);
   return json;
 }

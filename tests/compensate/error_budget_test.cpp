@@ -10,6 +10,7 @@
 
 #include "server/base/text_file.h"
 #include "server/compensate/budget/budget_words.h"
+#include "server/compensate/budget/remedies.h"
 #include "server/compensate/model_file.h"
 #include "server/trainer/pipeline/train.h"
 #include "tests/support/demand.h"
@@ -220,6 +221,43 @@ TEST(ErrorBudget, NamesWhatTooFewPosesCannotTellInOneLine) {
   ASSERT_NE(untold, nullptr);
   EXPECT_GT(untold->with.size(), 3u);
   for (const BudgetLine& line : budget_of(model).as_it_stands.lines) EXPECT_EQ(line.action, "") << line.line;
+}
+
+TEST(ErrorBudget, SaysWhatEachStepLeaves) {
+  World world;
+  world.zeros(3) = 3 * kDegree;
+  world.base = Vector3(0.01, 0, 0);
+  world.arm[1].a += 0.002;
+  const CompensatedModel model = trained(world, "base, geometry");
+  const std::vector<PutRight>& steps = budget_of(model).put_right;
+  ASSERT_EQ(steps.size(), 6u);
+  EXPECT_EQ(steps.front().step, "nothing");
+  EXPECT_LT(steps[1].left_rms, steps[0].left_rms);        // frames
+  EXPECT_LT(steps[2].left_rms, 0.2 * steps[1].left_rms);  // the zero of joint 4
+  EXPECT_LT(steps[3].left_rms, 0.05e-3);                  // the length of link 2
+  EXPECT_LT(steps[5].left_rms, 0.03e-3);
+  const std::vector<std::string> words = remedies_in_words(budget_of(model), model.cell().robot);
+  EXPECT_TRUE(std::any_of(words.begin(), words.end(), [](const std::string& line) {
+    return line.find("joint 4: +3.00") != std::string::npos;
+  })) << fmt::format("{}", fmt::join(words, "\n"));
+}
+
+TEST(ErrorBudget, AtTargetsIsThatOfThePredictedError) {
+  World world;
+  world.zeros(3) = 3 * kDegree;
+  const CompensatedModel model = trained(world, "base, geometry");
+  std::vector<PoseContext> targets;
+  for (const Eigen::VectorXd& q : drawn_poses(5)) {
+    PoseContext target;
+    target.q = q;
+    target.tool = "tip";
+    targets.push_back(target);
+  }
+  const ErrorBudget budget = error_budget(model, targets);
+  EXPECT_EQ(budget.poses, 5);
+  EXPECT_EQ(budget.as_it_stands.lines.front().line, "zero:4");
+  EXPECT_LT(budget.put_right.back().left_rms, 1e-9);
+  EXPECT_NEAR(sum_of_shares(budget.as_it_stands), 1, 1e-9);
 }
 
 TEST(ErrorBudget, IsKeptInTheFileOfItsModel) {

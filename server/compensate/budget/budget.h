@@ -62,6 +62,13 @@ struct BudgetView {
   std::vector<BudgetLine> lines;
 };
 
+/// What is left when this and all before it is put right, with base and tool frames touched again each time.
+struct PutRight {
+  std::string step;  ///< `nothing`, `frames`, `zeros`, `lengths`, `load`, `correction`
+  std::string name;  ///< for people
+  double left_rms = 0;  ///< m
+};
+
 /// The error budget of a model at measured poses.
 struct ErrorBudget {
   int poses = 0;
@@ -69,6 +76,7 @@ struct ErrorBudget {
   /// The same of what touching base and tool frames would leave: the best fit of both to the error is taken out of it
   /// and of every line. Lines of frames do not stand here.
   BudgetView beyond_frames;
+  std::vector<PutRight> put_right;  ///< one after the other
 
   [[nodiscard]] const BudgetLine* line(std::string_view name) const;
 };

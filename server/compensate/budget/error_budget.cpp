@@ -202,6 +202,31 @@ LeftAt left_by(const CompensatedModel& model, const MeasurementBatch& positions)
   return {R_WB * errors.nominal, R_WB * errors.calibrated, R_WB * errors.compensated};
 }
 
+/// What a shop puts right in this step, beside its frames.
+bool is_of_step(const BudgetLine& line, std::string_view step) {
+  if (step == "zeros") return line.kind == LineKind::kJointZero;
+  if (step == "lengths") return line.kind == LineKind::kLength || line.kind == LineKind::kTwist;
+  if (step == "load") return line.kind == LineKind::kJointCompliance || line.cause == "payload";
+  return false;
+}
+
+std::vector<PutRight> put_right(const std::vector<BudgetItem>& items, const Effects& effects,
+                                const BeyondFrames& beyond_frames) {
+  const auto rms = [](const Eigen::Matrix3Xd& vectors) { return std::sqrt(mean_square(vectors)); };
+  std::vector<PutRight> steps = {{"nothing", "as it stands", rms(effects.total)},
+                                 {"frames", "base and tool frames touched", rms(beyond_frames(effects.total))}};
+  Eigen::Matrix3Xd left = effects.total;
+  for (const auto& [step, name] : {std::pair("zeros", "zeros of the joints set in the controller"),
+                                   std::pair("lengths", "lengths and angles of the links, where a controller takes them"),
+                                   std::pair("load", "load data, where a controller takes the gearboxes into account")}) {
+    for (std::size_t k = 0; k < items.size(); ++k)
+      if (is_of_step(items[k].line, step)) left -= effects.lines[k];
+    steps.push_back({step, name, rms(beyond_frames(left))});
+  }
+  steps.push_back({"correction", "targets corrected by this model", rms(effects.rest)});
+  return steps;
+}
+
 /// `positions` is not empty.
 ErrorBudget budget_of(const Identified& found, const LeftAt& left, const MeasurementBatch& positions, bool has_bias) {
   ErrorBudget budget;
@@ -218,7 +243,9 @@ ErrorBudget budget_of(const Identified& found, const LeftAt& left, const Measure
   const Effects effects = effects_of(left, datum, items, positions);
   const ViewAsked asked{items, effects, untold, stated_mean_square(positions, *datum.model.cell), has_bias};
   budget.as_it_stands = view_of(asked, true, [](const Eigen::Matrix3Xd& all) { return all; });
-  budget.beyond_frames = view_of(asked, false, BeyondFrames(datum.model, positions));
+  const BeyondFrames beyond_frames(datum.model, positions);
+  budget.beyond_frames = view_of(asked, false, beyond_frames);
+  budget.put_right = put_right(items, effects, beyond_frames);
   return budget;
 }
 
@@ -230,6 +257,20 @@ ErrorBudget error_budget(const CompensatedModel& model, const MeasurementBatch& 
   const ModelParts& parts = model.parts();
   return budget_of({parts.physics, parts.parameters, parts.covariance}, left_by(model, positions), positions,
                    model.bias().has_value());
+}
+
+ErrorBudget error_budget(const CompensatedModel& model, const std::vector<PoseContext>& targets) {
+  MeasurementBatch as_predicted;
+  const std::vector<ErrorPrediction> predictions = model.predict_all(targets);
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    Measurement m;
+    m.context = targets[i];
+    m.context.served = true;
+    m.p_W = model.parts().physics.X_WB * predictions[i].X_BT_predicted.translation();
+    m.sigma = 0;
+    as_predicted.measurements.push_back(std::move(m));
+  }
+  return error_budget(model, as_predicted);
 }
 
 ErrorBudget error_budget(const CalibrationResult& calibration, const MeasurementBatch& measured) {

@@ -71,13 +71,22 @@ BudgetView view_from(const Json& json) {
 }  // namespace
 
 Json budget_json(const ErrorBudget& budget) {
+  Json steps = Json::array();
+  for (const PutRight& step : budget.put_right)
+    steps.push_back({{"step", step.step}, {"name", step.name}, {"left_m", step.left_rms}});
   return {{"poses", budget.poses},
           {"as_it_stands", json_of(budget.as_it_stands)},
-          {"beyond_frames", json_of(budget.beyond_frames)}};
+          {"beyond_frames", json_of(budget.beyond_frames)},
+          {"put_right", std::move(steps)}};
 }
 
 ErrorBudget budget_from(const Json& json) {
-  return {count_from(json, "poses"), view_from(json.at("as_it_stands")), view_from(json.at("beyond_frames"))};
+  ErrorBudget budget{
+      count_from(json, "poses"), view_from(json.at("as_it_stands")), view_from(json.at("beyond_frames")), {}};
+  for (const Json& step : list_from(json.at("put_right")))
+    budget.put_right.push_back(
+        {step.at("step").get<std::string>(), step.at("name").get<std::string>(), number_from(step, "left_m")});
+  return budget;
 }
 
 }  // namespace trammel::model_file

@@ -1,0 +1,93 @@
+#include "server/compensate/budget/remedies.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+
+#include "server/base/shown_value.h"
+#include "server/base/units.h"
+
+namespace trammel {
+
+namespace {
+
+struct Maker {
+  std::string_view begins;  ///< of the robot's name, in lower case
+  MakersWords words;
+};
+
+const std::vector<Maker>& makers() {
+  static const std::vector<Maker> all = {
+      {"abb",
+       {"ABB", "calibration offset of the axis (Calibration > Edit Motor Calibration Offset), then update the revolution counters",
+        "not in the controller, but by ABB's Absolute Accuracy", "tooldata: mass, cog; LoadIdentify"}},
+      {"kuka",
+       {"KUKA", "mastering of the axis (Start-up > Master), with the offset for the tool",
+        "$machine.dat, by KUKA's service alone", "Load data of the tool ($LOAD): M, X, Y, Z"}},
+      {"fanuc",
+       {"FANUC", "MENU > SYSTEM > Master/Cal, single-axis mastering ($DMR_GRP.$MASTER_COUN), then CALIBRATE",
+        "not in the controller, but by iRCalibration", "MOTION PAYLOAD SET ($PLST_GRP)"}},
+      {"yaskawa",
+       {"Yaskawa", "HOME POSITION of the axis (ROBOT > HOME POSITION)", "not in the controller",
+        "TOOL: W, Xg, Yg, Zg; W.GRAV.POS measurement"}},
+      {"universal robots",
+       {"Universal Robots", "calibration.conf: delta_theta of the joint (in rad), or joint zeroing in Expert Mode",
+        "calibration.conf: delta_a, delta_d, delta_alpha", "Payload: mass and centre of gravity (set_target_payload)"}},
+      {"staubli", {"Staubli", "recovery of the zero (Adjust), dpsRef of the axis", "arm.cfx, by the maker's service alone", "load of the tool"}},
+  };
+  return all;
+}
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+std::string signed_value(double value, double u95, const std::string& unit) {
+  const ShownValue read = show_read(value, u95, {1, unit});
+  return fmt::format("{}{} ± {} {}", value > 0 ? "+" : "", read.value, read.expanded, unit);
+}
+
+}  // namespace
+
+std::vector<ZeroRemedy> zero_remedies(const ErrorBudget& budget) {
+  std::vector<ZeroRemedy> zeros;
+  for (const BudgetLine& line : budget.as_it_stands.lines) {
+    if (line.kind != LineKind::kJointZero || !line.value || std::abs(line.value->value) <= line.value->u95) continue;
+    zeros.push_back({line.joint, line.value->value, line.value->u95, line.value->unit});
+  }
+  std::sort(zeros.begin(), zeros.end(),
+            [](const ZeroRemedy& one, const ZeroRemedy& other) { return one.joint < other.joint; });
+  return zeros;
+}
+
+MakersWords makers_words(const Chain& robot) {
+  const std::string name = lower(robot.name());
+  for (const Maker& maker : makers())
+    if (name.starts_with(maker.begins)) return maker.words;
+  return {"", "the zero of the axis in the controller", "where the controller takes lengths of its own arm",
+          "the load data of the tool"};
+}
+
+std::vector<std::string> remedies_in_words(const ErrorBudget& budget, const Chain& robot) {
+  if (budget.put_right.empty()) return {"no pose has a measured position: nothing can be said"};
+  const MakersWords words = makers_words(robot);
+  std::vector<std::string> text;
+  for (const PutRight& step : budget.put_right)
+    text.push_back(fmt::format("{:<72} {:>9.4f} mm", step.name, to_mm(step.left_rms)));
+  const std::vector<ZeroRemedy> zeros = zero_remedies(budget);
+  if (!zeros.empty())
+    text.push_back(fmt::format("zeros: the joint stands at the angle shown plus this; {}: {}",
+                               words.maker.empty() ? "in the controller" : words.maker, words.zeros));
+  for (const ZeroRemedy& zero : zeros)
+    text.push_back(fmt::format("  joint {}: {}", zero.joint + 1, signed_value(zero.add, zero.u95, zero.unit)));
+  if (zeros.empty()) text.emplace_back("zeros: none is off by more than its uncertainty");
+  text.push_back(fmt::format("lengths: {}", words.lengths));
+  text.push_back(fmt::format("load data: {}", words.load));
+  return text;
+}
+
+}  // namespace trammel

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/compensate/budget/budget.h"
+#include "server/robot/chain.h"
+
+namespace trammel {
+
+/// What is done to the zero of one joint: the controller shows an angle, and the joint stands `add` beyond it.
+struct ZeroRemedy {
+  int joint = 0;  ///< 0-based
+  double add = 0, u95 = 0;
+  std::string unit;  ///< `deg` or `mm`
+};
+/// Of every joint whose zero is off by more than its U.
+[[nodiscard]] std::vector<ZeroRemedy> zero_remedies(const ErrorBudget& budget);
+
+/// Where a maker's controller keeps zeros, lengths and load data, in the maker's own words. By the name of the robot
+/// file; general words where no maker is known.
+struct MakersWords {
+  std::string maker, zeros, lengths, load;
+};
+[[nodiscard]] MakersWords makers_words(const Chain& robot);
+
+/// What a shop can put right, step by step, for people.
+[[nodiscard]] std::vector<std::string> remedies_in_words(const ErrorBudget& budget, const Chain& robot);
+
+}  // namespace trammel

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+
+#include "server/compensate/budget/budget.h"
+#include "server/compensate/compensated_model.h"
+
+namespace trammel {
+
+/// What a shop can put right where, and what each step leaves, as a page for the wall. `where`: of which poses.
+[[nodiscard]] std::string remedies_page(const CompensatedModel& model, const ErrorBudget& budget,
+                                        const std::string& where);
+
+}  // namespace trammel
