@@ -21,8 +21,9 @@ std::string steps_table(const ErrorBudget& budget) {
   std::vector<HtmlRow> rows;
   for (const PutRight& step : budget.put_right) {
     const double width = longest > 0 ? 100 * step.left_rms / longest : 0;
-    rows.push_back({{html_text(step.name), fmt::format(R"(<span class="step_bar"><i style="width:{:.1f}%"></i></span>)", width),
-                     fmt::format("{:.4f}", to_mm(step.left_rms))}});
+    rows.push_back(
+        {{html_text(step.name), fmt::format(R"(<span class="step_bar"><i style="width:{:.1f}%"></i></span>)", width),
+          fmt::format("{:.4f}", to_mm(step.left_rms))}});
   }
   return html_table({"steps", {"put right, one after the other", "", "left, mm rms"}, rows});
 }
@@ -34,8 +35,8 @@ std::string zeros_table(const ErrorBudget& budget, const Chain& robot) {
   std::vector<HtmlRow> rows;
   for (const ZeroRemedy& zero : zeros) {
     const ShownValue read = show_read(zero.add, zero.u95, {1, zero.unit});
-    rows.push_back({{fmt::format("joint {}", zero.joint + 1), fmt::format("{}{} ± {} {}", zero.add > 0 ? "+" : "",
-                                                                         read.value, read.expanded, zero.unit)}});
+    rows.push_back({{fmt::format("joint {}", zero.joint + 1),
+                     fmt::format("{}{} ± {} {}", zero.add > 0 ? "+" : "", read.value, read.expanded, zero.unit)}});
   }
   return fmt::format("<p>The joint stands at the angle shown plus this. {}: {}.</p>",
                      html_text(words.maker.empty() ? "In the controller" : words.maker), html_text(words.zeros)) +

@@ -48,7 +48,8 @@ nlohmann::ordered_json remedies_json(const CompensatedModel& model, const ErrorB
   return {{"model", model.provenance().id},
           {"cell", model.cell().name},
           {"zeros", std::move(zeros)},
-          {"controller", {{"maker", words.maker}, {"zeros", words.zeros}, {"lengths", words.lengths}, {"load", words.load}}},
+          {"controller",
+           {{"maker", words.maker}, {"zeros", words.zeros}, {"lengths", words.lengths}, {"load", words.load}}},
           {"budget", budget_json(budget)}};
 }
 
@@ -57,8 +58,9 @@ Status remedies(const RemediesArguments& arguments) {
   if (!model) return tl::make_unexpected(model.error());
   const Result<ErrorBudget> budget = budget_asked(*model, arguments.targets);
   if (!budget) return tl::make_unexpected(budget.error());
-  const std::string where = arguments.targets.empty() ? fmt::format("{} training poses", budget->poses)
-                                                      : fmt::format("{} targets of {}", budget->poses, arguments.targets);
+  const std::string where = arguments.targets.empty()
+                                ? fmt::format("{} training poses", budget->poses)
+                                : fmt::format("{} targets of {}", budget->poses, arguments.targets);
   std::string text = fmt::format("{}, model {}, {}:\n", model->cell().robot.name(), model->provenance().id, where);
   for (const std::string& line : remedies_in_words(*budget, model->cell().robot)) text += line + "\n";
   tell(text, {arguments.output, arguments.json});

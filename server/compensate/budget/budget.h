@@ -64,8 +64,8 @@ struct BudgetView {
 
 /// What is left when this and all before it is put right, with base and tool frames touched again each time.
 struct PutRight {
-  std::string step;  ///< `nothing`, `frames`, `zeros`, `lengths`, `load`, `correction`
-  std::string name;  ///< for people
+  std::string step;     ///< `nothing`, `frames`, `zeros`, `lengths`, `load`, `correction`
+  std::string name;     ///< for people
   double left_rms = 0;  ///< m
 };
 

@@ -216,9 +216,10 @@ std::vector<PutRight> put_right(const std::vector<BudgetItem>& items, const Effe
   std::vector<PutRight> steps = {{"nothing", "as it stands", rms(effects.total)},
                                  {"frames", "base and tool frames touched", rms(beyond_frames(effects.total))}};
   Eigen::Matrix3Xd left = effects.total;
-  for (const auto& [step, name] : {std::pair("zeros", "zeros of the joints set in the controller"),
-                                   std::pair("lengths", "lengths and angles of the links, where a controller takes them"),
-                                   std::pair("load", "load data, where a controller takes the gearboxes into account")}) {
+  for (const auto& [step, name] :
+       {std::pair("zeros", "zeros of the joints set in the controller"),
+        std::pair("lengths", "lengths and angles of the links, where a controller takes them"),
+        std::pair("load", "load data, where a controller takes the gearboxes into account")}) {
     for (std::size_t k = 0; k < items.size(); ++k)
       if (is_of_step(items[k].line, step)) left -= effects.lines[k];
     steps.push_back({step, name, rms(beyond_frames(left))});

@@ -22,7 +22,9 @@ struct Maker {
 const std::vector<Maker>& makers() {
   static const std::vector<Maker> all = {
       {"abb",
-       {"ABB", "calibration offset of the axis (Calibration > Edit Motor Calibration Offset), then update the revolution counters",
+       {"ABB",
+        "calibration offset of the axis (Calibration > Edit Motor Calibration Offset), then update the revolution "
+        "counters",
         "not in the controller, but by ABB's Absolute Accuracy", "tooldata: mass, cog; LoadIdentify"}},
       {"kuka",
        {"KUKA", "mastering of the axis (Start-up > Master), with the offset for the tool",
@@ -36,7 +38,9 @@ const std::vector<Maker>& makers() {
       {"universal robots",
        {"Universal Robots", "calibration.conf: delta_theta of the joint (in rad), or joint zeroing in Expert Mode",
         "calibration.conf: delta_a, delta_d, delta_alpha", "Payload: mass and centre of gravity (set_target_payload)"}},
-      {"staubli", {"Staubli", "recovery of the zero (Adjust), dpsRef of the axis", "arm.cfx, by the maker's service alone", "load of the tool"}},
+      {"staubli",
+       {"Staubli", "recovery of the zero (Adjust), dpsRef of the axis", "arm.cfx, by the maker's service alone",
+        "load of the tool"}},
   };
   return all;
 }
