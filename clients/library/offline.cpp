@@ -22,6 +22,7 @@
 #include "server/measurement/pose_check.h"
 #include "server/measurement/pose_columns.h"
 #include "server/plan/plan.h"
+#include "server/report/budget_json.h"
 #include "server/report/diagnosis_json.h"
 #include "server/robot/inverse_kinematics.h"
 #include "server/simulate/simulate.h"
@@ -314,6 +315,11 @@ Measured Model::measured() const {
   out.volume_m3 = known->volume;
   if (known->reach) out.reach_mm = to_mm(*known->reach);
   return out;
+}
+
+std::string Model::budget_json() const {
+  const std::optional<ErrorBudget>& budget = inside_->model.parts().budget;
+  return budget ? trammel::budget_json(*budget).dump() : "null";
 }
 
 std::vector<Note> Model::notes() const { return library::to_api(notes_of(inside_->model)); }

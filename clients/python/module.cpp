@@ -377,6 +377,7 @@ void add_model_file(py::class_<api::Model>& type) {
       .def("parameter_covariance", &covariance_of)
       .def("figures", [](const api::Model& model) { return to_python(model.figures()); })
       .def("measured", &measured_of)
+      .def("budget_json", &api::Model::budget_json)
       .def("notes", [](const api::Model& model) { return to_python(model.notes()); });
 }
 

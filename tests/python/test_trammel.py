@@ -127,6 +127,13 @@ class Offline(unittest.TestCase):
         here = self.model.evaluate(trammel.Batch.load(self.batch_path))
         self.assertEqual(json.loads(json.dumps(here)), printed)
 
+    def test_tells_where_the_millimetres_come_from(self):
+        budget = self.model.budget()
+        self.assertAlmostEqual(sum(line["share"] for line in budget["lines"]), 1, places=9)
+        self.assertEqual(budget["remedies"][0]["step"], "nothing")
+        printed = json.loads(command_line("remedies", "--model", self.model_path, "--json", "-"))
+        self.assertEqual(printed["budget"], budget)
+
     def test_diagnoses_what_the_command_line_diagnoses(self):
         few = trammel.Batch.parse("".join(self.batch.csv().splitlines(keepends=True)[:41]), "few")
         (self.folder / "few.csv").write_text(few.csv())

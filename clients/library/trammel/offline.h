@@ -159,6 +159,9 @@ class TRAMMEL_API Model {
   [[nodiscard]] Evaluation figures() const;
   /// What its promise is about.
   [[nodiscard]] Measured measured() const;
+  /// Where the millimetres come from: JSON, as `budget` of `trammel train --json`; `null` where no training pose has a
+  /// position.
+  [[nodiscard]] std::string budget_json() const;
   /// What a user of the model should know, the gravest first.
   [[nodiscard]] std::vector<Note> notes() const;
 

@@ -402,6 +402,13 @@ class Model:
         """What its training poses were, as `measured` of `trammel train --json`: a promise is about these."""
         return self._inside.measured()
 
+    def budget(self) -> Optional[Dict[str, Any]]:
+        """Where the millimetres come from, as `budget` of `trammel train --json`: `nominal_rms_mm`, `lines` (each with
+        `line`, `value`, `u95`, `unit`, `alone_rms_mm`, `share`, `action`, ...), `remedies` and `beyond_frames`. None where
+        no training pose has a position."""
+        found: Optional[Dict[str, Any]] = json.loads(self._inside.budget_json())
+        return found
+
     @property
     def notes(self) -> List[Dict[str, Any]]:
         """What a user of the model should know, the gravest first: `code`, `severity` (`info`, `warning`, `stop`), `text`."""
