@@ -17,6 +17,7 @@
 #include "idl/heartbeat_pace.h"
 #include "idl/limits.h"
 #include "idl/lost_leases.h"
+#include "idl/own_messages.h"
 #include "server/base/mutex.h"
 
 namespace trammel::wire {
@@ -143,6 +144,7 @@ class Gate final : public rtps::ChainingTransport {
       knows_itself_ = true;
     }
     if (guard_) guard_->sent(Bytes(buffer, size));
+    if (guard_) own_messages_.sent(Bytes(buffer, size));
     // A newcomer asks for the next 256 numbers at each HEARTBEAT: it hears those that the others are spared.
     const bool to_all = pace_.lets_out(Bytes(buffer, size));
     if (!domain_) return !to_all || below->send(buffer, size, first, last, limit);
@@ -166,6 +168,10 @@ class Gate final : public rtps::ChainingTransport {
 
   void receive(rtps::TransportReceiverInterface* next, const unsigned char* buffer, std::uint32_t size,
                const Locator_t& here, const Locator_t& there) override {
+    if (guard_ && is_own(Bytes(buffer, size)) && !own_messages_.has(Bytes(buffer, size))) {
+      dropped_->add(Dropped::kSource);
+      return;
+    }
     const auto passed = guard_ ? guard_->check(Bytes(buffer, size), socket_of(there)) : Bytes(buffer, size);
     if (!passed) return;
     const Bytes message = *passed;
@@ -203,6 +209,7 @@ class Gate final : public rtps::ChainingTransport {
     std::copy_n(message.begin() + kPrefixAt, kPrefix, prefix.begin());
     if (!leases_.lets_in(prefix, now)) return false;
     if (asks_for_endpoints(message)) askers_.asks(prefix, now);
+    pace_.heard(message);
     any_data(message, [&](const Data& data) {
       if (data.writer != kAnnouncer) return false;
       if (data.payload.empty()) {
@@ -234,7 +241,9 @@ class Gate final : public rtps::ChainingTransport {
   std::unique_ptr<GateDescriptor> configuration_;
   const std::optional<std::uint32_t> domain_;
   const std::shared_ptr<HeardOfItself> heard_;
+  const std::shared_ptr<DropCounts> dropped_;  // null as guard_ is
   const std::unique_ptr<Guard> guard_;
+  OwnMessages own_messages_;
   std::vector<std::uint64_t> hosts_;  // their sockets
   HeartbeatPace pace_;
   LostLeases leases_{kLease};
@@ -271,6 +280,7 @@ Gate::Gate(const GateDescriptor& descriptor)
       configuration_(std::make_unique<GateDescriptor>(descriptor)),
       domain_(descriptor.all_domains ? std::nullopt : std::optional(descriptor.options.domain)),
       heard_(descriptor.options.heard),
+      dropped_(descriptor.options.dropped),
       guard_(descriptor.options.dropped
                  ? std::make_unique<Guard>(static_cast<std::uint32_t>(kMaxTextSample), descriptor.options.dropped,
                                            descriptor.relays, descriptor.options.secured)

@@ -54,9 +54,12 @@ std::optional<std::uint32_t> ends_of_first_question(const Submessage& submessage
 bool HeartbeatPace::lets_out(Bytes message, Time now) {
   const auto lone = lone_submessage(message);
   if (!lone) return true;
-  if (lone->submessage.id == kHeartbeat && lone->to.empty()) {
+  if (lone->submessage.id == kHeartbeat) {
+    constexpr unsigned char kSaysAlive = 0x04;
+    if (!lone->to.empty() && (lone->submessage.flags & kSaysAlive) != 0) return true;
     const auto writer = writer_of_heartbeat(lone->submessage);
-    return !writer || lets_heartbeat_out(*writer, now);
+    if (!writer) return true;
+    return lone->to.empty() ? lets_heartbeat_out(*writer, now) : lets_offer_out(lone->to, *writer, now);
   }
   if (lone->submessage.id != kAckNack || lone->to.empty()) return true;
   const auto ends = ends_of_first_question(lone->submessage);
@@ -71,6 +74,29 @@ bool HeartbeatPace::lets_heartbeat_out(std::uint32_t writer, Time now) {
   const Time::rep at = now.time_since_epoch().count();
   if (before != 0 && Time::duration(at - before) < kBetween) return false;
   return last.compare_exchange_strong(before, at);
+}
+
+bool HeartbeatPace::lets_offer_out(Bytes to, std::uint32_t writer, Time now) {
+  const MutexLock lock(mutex_);
+  Offers& offers = offers_.at(key_of(to, writer), now);
+  const Time* const answered = answered_.find(key_of(to, 0), now);
+  const bool is_first = now - std::exchange(offers.made, now) > kNewSeries;
+  if (is_first) offers.since = now;
+  if (answered != nullptr) offers.since = std::max(offers.since, *answered);
+  if (now - offers.since >= kPatience && now - offers.last < kBetweenUnanswered) return false;
+  offers.last = now;
+  return true;
+}
+
+void HeartbeatPace::heard(Bytes message, Time now) {
+  if (message.size() < kHeader) return;
+  Bytes rest = message.subspan(kHeader);
+  while (const auto submessage = next_submessage(rest)) {
+    if (submessage->id != kAckNack && submessage->id != kNackFrag) continue;
+    const MutexLock lock(mutex_);
+    answered_.at(key_of(message.subspan(kPrefixAt, kPrefix), 0), now) = now;
+    return;
+  }
 }
 
 bool HeartbeatPace::lets_question_out(const EndpointKey& asked, Time now) {

@@ -54,9 +54,13 @@ class CountedSends final : public SenderResource {
   std::vector<std::uint32_t> ports_;
 };
 
-class Unheard final : public rtps::TransportReceiverInterface {
+/// What the library would get.
+class HeardMessages final : public rtps::TransportReceiverInterface {
  public:
-  void OnDataReceived(const unsigned char*, const std::uint32_t, const Locator_t&, const Locator_t&) override {}
+  void OnDataReceived(const unsigned char*, const std::uint32_t, const Locator_t&, const Locator_t&) override {
+    ++messages;
+  }
+  int messages = 0;
 };
 
 PacketBytes announcement(const Prefix& of, std::uint16_t port) {
@@ -70,14 +74,14 @@ PacketBytes announcement(const Prefix& of, std::uint16_t port) {
 
 class GateSending : public testing::Test {
  protected:
-  GateSending()
+  explicit GateSending(const GateOptions& options = {})
       : gate_(dynamic_cast<rtps::ChainingTransport*>(
-            with_domain_gate(std::make_shared<rtps::UDPv4TransportDescriptor>(), {})->create_transport())) {
+            with_domain_gate(std::make_shared<rtps::UDPv4TransportDescriptor>(), options)->create_transport())) {
     hear(announcement(kResident, kOfResident));
     hear(announcement(kNewcomer, kOfNewcomer));
   }
   void hear(const PacketBytes& message) {
-    gate_->receive(&nobody_, message.data(), static_cast<std::uint32_t>(message.size()), locator("127.0.0.1", 2000),
+    gate_->receive(&heard_, message.data(), static_cast<std::uint32_t>(message.size()), locator("127.0.0.1", 2000),
                    locator("127.0.0.1", 3000));
   }
   /// To both of them.
@@ -92,7 +96,7 @@ class GateSending : public testing::Test {
   }
 
   std::unique_ptr<rtps::ChainingTransport> gate_;
-  Unheard nobody_;
+  HeardMessages heard_;
   CountedSends sends_;
 };
 
@@ -114,6 +118,40 @@ TEST_F(GateSending, WhoHasConfirmedEverythingIsNoNewcomer) {
   }
   EXPECT_LT(sends_.to(kOfNewcomer), kOffers);
   EXPECT_EQ(sends_.to(kOfResident), sends_.to(kOfNewcomer));
+}
+
+class GuardedGate : public GateSending {
+ protected:
+  static GateOptions guarded() {
+    GateOptions options;
+    options.dropped = std::make_shared<DropCounts>();
+    return options;
+  }
+  GuardedGate() : GateSending(guarded()) {}
+  /// How many of them the library gets.
+  int heard(const PacketBytes& message) {
+    const int before = heard_.messages;
+    hear(message);
+    return heard_.messages - before;
+  }
+};
+
+TEST_F(GuardedGate, WhatComesInOurOwnNameIsHeardOnlyWhereWeHaveSentIt) {
+  const auto with_statistics = [](unsigned char told) {
+    return Packet(kSelf)
+        .heartbeat(kTheirReader, kPublications, 1, 900, 7)
+        .submessage(kStatistics, 1, PacketBytes(56, told))
+        .bytes();
+  };
+  send(with_statistics(1));
+  EXPECT_EQ(heard(with_statistics(2)), 1) << "the transport below writes the statistics anew";
+  EXPECT_EQ(heard(offer(7)), 1);
+  EXPECT_EQ(heard(offer(8)), 0) << "a count that we have not said";
+  EXPECT_EQ(heard(Packet(kSelf).heartbeat(kTheirReader, kPublications, 900, 900, 7).bytes()), 0);
+  send(Packet(kSelf).to(kResident).heartbeat(kTheirReader, kPublications, 1, 900, 9).bytes());
+  EXPECT_EQ(heard(Packet(kSelf).to(kResident).heartbeat(kTheirReader, kPublications, 1, 900, 9).bytes()), 0)
+      << "it was for somebody else";
+  EXPECT_EQ(heard(Packet(kResident).to(kSelf).heartbeat(kTheirReader, kPublications, 1, 900, 9).bytes()), 1);
 }
 
 TEST(Askers, WhoAsksForEndpointsIsKnownByTheNumbersThatItLacks) {

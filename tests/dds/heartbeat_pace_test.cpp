@@ -69,6 +69,39 @@ TEST(HeartbeatPace, AWriterThatOffersNothingIsAskedMoreAndMoreSeldom) {
   EXPECT_TRUE(pace.lets_out(Packet(kSelf).to(kOther).acknack(kUserReader, kUserWriter, 0, 8, 1).bytes(), now));
 }
 
+/// What leaves of an offer that is made every 10 ms for so long.
+int offered(HeartbeatPace& pace, HeartbeatPace::Time from, int milliseconds_long) {
+  int left = 0;
+  for (int ms = 0; ms < milliseconds_long; ms += 10) {
+    const auto message = Packet(kSelf).to(kOther).heartbeat(kUserReader, kUserWriter, 1, 9, 1).bytes();
+    left += pace.lets_out(message, from + milliseconds(ms)) ? 1 : 0;
+  }
+  return left;
+}
+
+TEST(HeartbeatPace, AReaderThatNeverConfirmsIsToldFiveTimesASecond) {
+  HeartbeatPace pace;
+  EXPECT_EQ(offered(pace, kStart, 500), 50) << "it may be slow, or the line may lose something";
+  const auto then = kStart + milliseconds(500);
+  const int left = offered(pace, then, 10'000);
+  EXPECT_LE(left, 51);
+  EXPECT_GE(left, 49);
+  EXPECT_EQ(offered(pace, then + milliseconds(12'000), 100), 10) << "something new is to be confirmed";
+}
+
+TEST(HeartbeatPace, WhoAnswersIsOfferedAtOnceWhatItLacks) {
+  HeartbeatPace pace;
+  static_cast<void>(offered(pace, kStart, 2000));
+  const auto then = kStart + milliseconds(2000);
+  pace.heard(Packet(kSelf).to(kSelf).acknack(kUserReader, kUserWriter, 1, 8, 1).bytes(), then);
+  EXPECT_LT(offered(pace, then, 300), 10) << "somebody else answers";
+  pace.heard(Packet(kOther).to(kSelf).acknack(kUserReader, kUserWriter, 1, 8, 1).bytes(), then + milliseconds(300));
+  EXPECT_EQ(offered(pace, then + milliseconds(300), 400), 40);
+  pace.heard(Packet(kOther).to(kSelf).nack_frag(kUserReader, kUserWriter, 1, 1, 1).bytes(), then + milliseconds(700));
+  EXPECT_EQ(offered(pace, then + milliseconds(700), 400), 40);
+  pace.heard({}, then);
+}
+
 TEST(HeartbeatPace, WhatHoldsDataOrIsOfAnotherWriterLeavesAtOnce) {
   HeartbeatPace pace;
   for (int i = 0; i < 3; ++i) {

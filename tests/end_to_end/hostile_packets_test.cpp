@@ -226,6 +226,27 @@ TEST(HostilePackets, AnAnnouncementThatNamesSocketsOfOthersSendsThemNextToNothin
   EXPECT_LE(datagrams, 8);
 }
 
+// Its watchdog ends a daemon that no longer hears itself.
+TEST(HostilePackets, WhatIsSaidInTheDaemonsOwnNameDoesNotMakeItDeafToItself) {
+  test::Daemon daemon;
+  daemon.start();
+  RawParticipant stranger(daemon.port(), daemon.domain());
+  ASSERT_TRUE(stranger.meet(kLimit));
+  const auto session = client::Session::open(daemon.session_options()).value();
+  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(6);
+  for (std::uint32_t count = 1000; std::chrono::steady_clock::now() < until; ++count) {
+    for (std::uint32_t writer = 1; writer <= 60; ++writer) {
+      for (const std::uint32_t kind : {2u, 3u}) {
+        test::Packet skips(stranger.peer());
+        skips.to(stranger.peer()).heartbeat(0, writer << 8 | kind, 1 << 19, 1 << 19, count);
+        stranger.send(skips.bytes());
+      }
+    }
+    ASSERT_TRUE(session->models("cell-7"));
+  }
+  EXPECT_EQ(daemon.stop(), 0) << daemon.process().standard_error();
+}
+
 TEST(HostilePackets, HonestClientsLoseNothingWhileOthersAreKilled) {
   test::Daemon daemon;
   daemon.start();
