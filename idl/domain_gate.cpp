@@ -282,8 +282,10 @@ Gate::Gate(const GateDescriptor& descriptor)
       heard_(descriptor.options.heard),
       dropped_(descriptor.options.dropped),
       guard_(descriptor.options.dropped
-                 ? std::make_unique<Guard>(static_cast<std::uint32_t>(kMaxTextSample), descriptor.options.dropped,
-                                           descriptor.relays, descriptor.options.secured)
+                 ? std::make_unique<Guard>(
+                       static_cast<std::uint32_t>(kMaxTextSample), descriptor.options.dropped, descriptor.relays,
+                       descriptor.options.secured,
+                       descriptor.options.serves ? EndpointWatch::kMostOfClient : EndpointWatch::kMostOfServer)
                  : nullptr) {
   for (const Locator_t& host : descriptor.options.hosts) hosts_.push_back(socket_of(host));
 }

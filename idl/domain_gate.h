@@ -47,6 +47,7 @@ struct GateOptions {
   std::shared_ptr<DropCounts> dropped = {};   ///< null: there is no guard. For tests that show what it is for
   std::uint32_t largest_sent = UINT32_MAX;    ///< bytes of a datagram; others may send what `below` takes
   bool secured = false;                       ///< participants prove who they are
+  bool serves = false;                        ///< others are clients: they have few endpoints
   /// Where others are looked for: they are sent what they are sent, whoever else names them.
   std::vector<eprosima::fastrtps::rtps::Locator_t> hosts = {};
 };

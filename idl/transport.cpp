@@ -85,6 +85,7 @@ Result<ParticipantPtr> make_participant(const ParticipantOptions& options, dds::
   if (!udp) return tl::make_unexpected(udp.error());
   GateOptions gate{options.domain, options.heard_of_itself, options.dropped};
   gate.secured = options.security.has_value();
+  gate.serves = options.heard_of_itself != nullptr;
   for (const std::uint16_t port : options.peer_ports) gate.hosts.push_back(locator(options.address, port));
   for (const HostPort& peer : options.peers) gate.hosts.push_back(locator(peer.address, peer.port));
   if (options.heard_of_itself) gate.hosts.push_back(locator(options.address, options.listen_port));

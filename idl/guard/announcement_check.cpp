@@ -255,9 +255,17 @@ Fault check_announcement(Bytes payload, Bytes source, EditedMessage& message, Re
       message.put(here.first(2), std::uint16_t{kPadding}, little_endian);
     const bool names = parameter.id == kParticipantGuid || parameter.id == kEndpointGuid || parameter.id == kKeyHash;
     if (names && !is_of(parameter.value, source)) return Dropped::kSource;
+    if (parameter.id == kEndpointGuid) reachable.endpoint = Reader(parameter.value.last(4), false).entity();
     if (parameter.id == kPartition && has_wildcard(Reader(parameter.value, little_endian))) return Dropped::kWildcard;
     if (parameter.id == kLease && !cut_lease(parameter, message, reachable)) return Dropped::kParameters;
   }
+}
+
+std::optional<Bytes> guid_in_inline_qos(Reader inline_qos) {
+  while (const auto parameter = next_parameter(inline_qos)) {
+    if (parameter->id == kKeyHash && parameter->value.size() == kGuid) return parameter->value;
+  }
+  return std::nullopt;
 }
 
 std::optional<Bytes> guid_in_key(Bytes key) {

@@ -46,6 +46,7 @@ struct Reachable {
   bool little_endian = true;
   NamedSockets sockets{};
   std::array<Bytes, NamedSockets::kMost> stands{};  ///< where the id of each of the sockets' parameters stands
+  std::optional<std::uint32_t> endpoint{};          ///< its entity id, the first octet the highest
 };
 
 /// The payload of a participant's, writer's or reader's announcement by `source`: each length and count within its
@@ -55,6 +56,8 @@ struct Reachable {
 [[nodiscard]] std::optional<Dropped> check_announcement(Bytes payload, Bytes source, EditedMessage& message,
                                                         Reachable& reachable);
 
+/// The GUID that the inline QoS say is meant. Empty: none.
+[[nodiscard]] std::optional<Bytes> guid_in_inline_qos(Reader inline_qos);
 /// The GUID in the key of a participant or endpoint that has gone: a list of parameters. Empty: there is none.
 [[nodiscard]] std::optional<Bytes> guid_in_key(Bytes key);
 

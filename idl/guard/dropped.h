@@ -25,8 +25,9 @@ enum class Dropped : std::uint8_t {
   kNotSent,       ///< asks for fragments of a sample that was never sent in fragments
   kSecurity,      ///< a security submessage without its head or its tail
   kWildcard,      ///< an endpoint in partitions with wildcards
+  kEndpoints,     ///< too many endpoints of one participant
 };
-inline constexpr std::size_t kDroppedReasons = 16;
+inline constexpr std::size_t kDroppedReasons = 17;
 
 /// For people: "statistics submessage".
 [[nodiscard]] const char* name_of(Dropped reason);

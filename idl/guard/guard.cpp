@@ -16,26 +16,30 @@ constexpr std::array<const char*, kDroppedReasons> kNames = {"no RTPS message", 
                                                              "sample size",           "unfinished samples",
                                                              "counts that jump",      "numbers skipped",
                                                              "too many participants", "fragments that were never sent",
-                                                             "security submessages",  "partitions with wildcards"};
+                                                             "security submessages",  "partitions with wildcards",
+                                                             "too many endpoints"};
 
 }  // namespace
 
 const char* name_of(Dropped reason) { return kNames[static_cast<std::size_t>(reason)]; }
 
-Guard::Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts, std::vector<Relay> relays, bool secured)
+Guard::Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts, std::vector<Relay> relays, bool secured,
+             std::size_t most_endpoints)
     : largest_sample_(largest_sample),
       counts_(counts ? std::move(counts) : std::make_shared<DropCounts>()),
       relays_(std::move(relays)),
-      secured_(secured) {}
+      secured_(secured),
+      memory_(most_endpoints) {}
 
 std::optional<Bytes> Guard::check(Bytes message, std::uint64_t socket, Time now) {
   EditedMessage edited(message);
   const bool relayed = is_of_relay(message, socket);
-  if (const auto dropped =
-          MessageCheck({largest_sample_, socket, now, relayed, secured_}, memory_, message, edited).run()) {
+  MessageCheck check({largest_sample_, socket, now, relayed, secured_}, memory_, message, edited);
+  if (const auto dropped = check.run()) {
     counts_->add(*dropped);
     return std::nullopt;
   }
+  if (check.left_out()) counts_->add(*check.left_out());
   return edited.bytes();
 }
 

@@ -16,8 +16,8 @@ namespace trammel::wire {
 
 /// Stands before the library's receiver: drops what would end, stop or flood it, and passes everything that an honest
 /// participant sends, secured or not. README.md says what is dropped and why. Reads hostile bytes: it never reads
-/// beyond a message, allocates nothing per packet and throws nothing. Thread-safe; it takes its one lock only for
-/// messages whose sender it must remember.
+/// beyond a message, allocates nothing but for an endpoint that is new, and throws nothing. Thread-safe; it takes its
+/// one lock only for messages whose sender it must remember.
 class Guard {
  public:
   using Time = std::chrono::steady_clock::time_point;
@@ -25,8 +25,10 @@ class Guard {
   /// `largest_sample`: bytes that a sample of any topic may have.
   /// `relays` may announce others.
   /// `secured`: participants prove who they are, so what is said without proof sends none of them away.
+  /// `most_endpoints`: of one participant.
   explicit Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts = nullptr,
-                 std::vector<Relay> relays = {}, bool secured = false);
+                 std::vector<Relay> relays = {}, bool secured = false,
+                 std::size_t most_endpoints = EndpointWatch::kMostOfServer);
 
   /// What of a message that was received from `socket` (address and port) the library may see: all of it, as a rule.
   /// Empty: nothing. Valid until the calling thread's next call.

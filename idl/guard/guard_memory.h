@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 
+#include "idl/guard/endpoint_watch.h"
 #include "idl/guard/fragment_watch.h"
 #include "idl/guard/participant_watch.h"
 #include "idl/guard/sequence_watch.h"
@@ -13,11 +14,14 @@ namespace trammel::wire {
 
 /// What the guard remembers of those who send, and of what was sent.
 struct GuardMemory {
+  explicit GuardMemory(std::size_t most_endpoints) : endpoints(most_endpoints) {}
+
   Mutex mutex;
   SequenceWatch sequences TRAMMEL_GUARDED_BY(mutex);
   UnfinishedSamples unfinished TRAMMEL_GUARDED_BY(mutex);
   SentSamples sent TRAMMEL_GUARDED_BY(mutex);
   ParticipantWatch participants TRAMMEL_GUARDED_BY(mutex);
+  EndpointWatch endpoints TRAMMEL_GUARDED_BY(mutex);
   std::array<unsigned char, kPrefix> own TRAMMEL_GUARDED_BY(mutex) = {};  // prefix; zeros: nothing was sent yet
   std::atomic<bool> knows_strangers{false};                               // among `participants`
 

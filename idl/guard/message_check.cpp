@@ -147,6 +147,7 @@ std::optional<Dropped> MessageCheck::check_data(const Submessage& submessage) {
 
   const bool announcement = is_announcement_writer(head->writer);
   bool says_status = false;
+  const Reader inline_qos = after;
   if ((submessage.flags & kInlineQos) != 0) {
     if (const Fault fault = check_inline_qos(after, named_, announcement, says_status)) return fault;
   }
@@ -162,13 +163,19 @@ std::optional<Dropped> MessageCheck::check_data(const Submessage& submessage) {
     if (!signed_) edited_.put(submessage.body.subspan(4, 4), std::array<unsigned char, 4>{0xff, 0xff, 0xff, 0xff});
     const MutexLock lock(memory_.mutex);
     memory_.participants.left(source_);
+    memory_.endpoints.left(source_);
     memory_.note_strangers();
   }
+  const bool of_endpoint = head->writer == kPublications || head->writer == kSubscriptions;
+  const bool has_ended = (!payload || says_status) && of_endpoint && !received_.relayed;
+  if (has_ended && (submessage.flags & kInlineQos) != 0) note_end_of_endpoint(guid_in_inline_qos(inline_qos));
   if (!payload && !key) return says_status ? Fault() : Fault(Dropped::kLength);
   if (after.rest().size() < 4) return Dropped::kLength;
+  if (has_ended && key) note_end_of_endpoint(guid_in_key(after.rest()));
   if (!payload) return announcement ? check_key_of_gone(submessage, after.rest()) : Fault();
   const bool handshake = head->writer == kHandshake || head->reader == kHandshakeReader;
-  return handshake ? check_handshake(after.rest(), source_) : check_announced(submessage, head->writer, after.rest());
+  return handshake ? check_handshake(after.rest(), source_)
+                   : check_announced(submessage, head->writer, *number, after.rest());
 }
 
 /// Cyclone DDS says by a key alone who has gone. The library takes that from the inline QoS only: the key moves there,
@@ -247,7 +254,7 @@ std::optional<Dropped> MessageCheck::check_destination(const Submessage& submess
 }
 
 std::optional<Dropped> MessageCheck::check_announced(const Submessage& submessage, std::uint32_t writer,
-                                                     Bytes payload) {
+                                                     std::int64_t number, Bytes payload) {
   Reachable reachable;
   if (is_announcement_writer(writer)) {
     if (const Fault fault = check_announcement(payload, named_, edited_, reachable)) return fault;
@@ -257,14 +264,14 @@ std::optional<Dropped> MessageCheck::check_announced(const Submessage& submessag
   const MutexLock lock(memory_.mutex);
   if (memory_.is_own(source_)) return {};
   if (writer != kAnnouncer) {
-    blank_sockets(reachable, [&](std::uint64_t socket) TRAMMEL_REQUIRES(memory_.mutex) {
-      return memory_.participants.listens_at(source_, socket, received_.now);
-    });
+    check_endpoint(submessage, number, reachable);
     return {};
   }
-  blank_sockets(reachable, [&](std::uint64_t socket) {
-    return static_cast<std::uint32_t>(socket) == static_cast<std::uint32_t>(received_.socket);
-  });
+  NamedSockets here;
+  for (const std::uint64_t socket : reachable.sockets.all()) {
+    if (static_cast<std::uint32_t>(socket) == static_cast<std::uint32_t>(received_.socket)) here.add(socket);
+  }
+  blank_others(reachable, here);
   const auto admission =
       memory_.participants.announced(source_, received_.socket, reachable, received_.secured, received_.now);
   memory_.note_strangers();
@@ -277,20 +284,39 @@ std::optional<Dropped> MessageCheck::check_announced(const Submessage& submessag
   return admission.dropped;
 }
 
+/// The library knows no endpoints of participants that it does not know.
+void MessageCheck::check_endpoint(const Submessage& submessage, std::int64_t number, Reachable& reachable) {
+  if (!memory_.participants.is_there(source_, received_.now)) return;
+  for (const auto& prefix : memory_.endpoints.to_be_looked_at()) {
+    if (!memory_.participants.is_there(prefix, received_.now)) memory_.endpoints.left(prefix);
+  }
+  if (reachable.endpoint && !memory_.endpoints.found(source_, *reachable.endpoint) &&
+      submessage.body.size() >= kGapBody) {
+    make_gap(submessage, number);
+    left_out_ = Dropped::kEndpoints;
+    return;
+  }
+  NamedSockets own;
+  for (const std::uint64_t socket : reachable.sockets.all()) {
+    if (memory_.participants.listens_at(source_, socket, received_.now)) own.add(socket);
+  }
+  blank_others(reachable, own);
+}
+
+void MessageCheck::note_end_of_endpoint(std::optional<Bytes> guid) {
+  if (!guid) return;
+  const MutexLock lock(memory_.mutex);
+  memory_.endpoints.lost(source_, Reader(guid->last(4), false).entity().value_or(0));
+}
+
 /// The library would send there without end. Where none is left of an endpoint it takes those of its participant.
-template <typename Allowed>
-void MessageCheck::blank_sockets(Reachable& reachable, const Allowed& allowed) {
+void MessageCheck::blank_others(Reachable& reachable, const NamedSockets& allowed) {
   constexpr std::uint16_t kPadding = 0;
-  NamedSockets left;
   const auto all = reachable.sockets.all();
   for (std::size_t i = 0; i < all.size(); ++i) {
-    if (allowed(all[i])) {
-      left.add(all[i]);
-    } else {
-      edited_.put(reachable.stands[i], kPadding, reachable.little_endian);
-    }
+    if (!allowed.has(all[i])) edited_.put(reachable.stands[i], kPadding, reachable.little_endian);
   }
-  reachable.sockets = left;
+  reachable.sockets = allowed;
 }
 
 std::optional<Dropped> MessageCheck::check_fragments(const Submessage& submessage) {

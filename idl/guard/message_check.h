@@ -27,6 +27,8 @@ class MessageCheck {
       : received_(received), memory_(memory), message_(message), edited_(edited) {}
 
   [[nodiscard]] std::optional<Dropped> run();
+  /// Why the message passes without some of what it says; empty: it does not.
+  [[nodiscard]] std::optional<Dropped> left_out() const { return left_out_; }
 
  private:
   using Fault = std::optional<Dropped>;
@@ -44,9 +46,11 @@ class MessageCheck {
   [[nodiscard]] bool is_unproven(std::uint32_t writer) const;
   void ignore_end(std::uint32_t writer, const Submessage& data, std::int64_t number);
   Fault check_destination(const Submessage& submessage);
-  Fault check_announced(const Submessage& submessage, std::uint32_t writer, Bytes payload);
-  template <typename Allowed>
-  void blank_sockets(Reachable& reachable, const Allowed& allowed) TRAMMEL_REQUIRES(memory_.mutex);
+  Fault check_announced(const Submessage& submessage, std::uint32_t writer, std::int64_t number, Bytes payload);
+  void check_endpoint(const Submessage& submessage, std::int64_t number, Reachable& reachable)
+      TRAMMEL_REQUIRES(memory_.mutex);
+  void note_end_of_endpoint(std::optional<Bytes> guid);
+  void blank_others(Reachable& reachable, const NamedSockets& allowed);
   Fault check_fragments(const Submessage& submessage);
   Fault cut_too_large(const Submessage& submessage, Bytes payload, std::uint32_t sample_size);
   Fault check_heartbeat(const Submessage& submessage);
@@ -65,6 +69,7 @@ class MessageCheck {
   Bytes source_{};       // prefix
   Bytes named_{};        // the prefix that announcements must name; empty: any
   bool signed_ = false;  // the library holds the whole message against its sender's key
+  Fault left_out_{};
 };
 
 }  // namespace trammel::wire

@@ -90,6 +90,11 @@ void ParticipantWatch::left(Bytes prefix) {
   forget_stranger(key);
 }
 
+bool ParticipantWatch::is_there(Bytes prefix, Time now) {
+  const Participant* const known = participants_.find(key_of(prefix, 0), now);
+  return known != nullptr && known->until > now;
+}
+
 bool ParticipantWatch::listens_at(Bytes prefix, std::uint64_t socket, Time now) {
   const Participant* const known = participants_.find(key_of(prefix, 0), now);
   return known != nullptr && known->until > now && known->sockets.has(socket);

@@ -40,6 +40,7 @@ class ParticipantWatch {
   /// It has sent something to us, by our name: it hears us.
   void spoke(Bytes prefix, Time now);
   void left(Bytes prefix);
+  [[nodiscard]] bool is_there(Bytes prefix, Time now);
   /// Whether the participant has announced that it listens there: its endpoints listen nowhere else.
   [[nodiscard]] bool listens_at(Bytes prefix, std::uint64_t socket, Time now);
 

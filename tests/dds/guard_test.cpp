@@ -751,6 +751,30 @@ TEST(Guard, WhoLeavesMakesRoom) {
   EXPECT_TRUE(hears(guard, 5000, now));
 }
 
+TEST(Guard, TheEndpointsOfAParticipantAreCountedAndOneTooManyIsSkipped) {
+  constexpr std::size_t kMost = 5;
+  Guard guard(kMaxTextSample, nullptr, {}, false, kMost);
+  const auto announced = [](std::uint32_t entity, const Prefix& of = kSource) {
+    const ParameterList list = ParameterList().guid(0x005a, of, entity).text(0x0005, "Topic").text(0x0007, "Type");
+    return Packet(of).data({0, kPublications, 7, {}, list.payload()}).bytes();
+  };
+  const auto kind = [&](const PacketBytes& message) { return kinds(let_in(guard, message)); };
+  EXPECT_EQ(kind(announced(0x103)), std::vector<int>{kData}) << "of nobody whom the library knows";
+  ASSERT_FALSE(let_in(guard, announcement(participant(100))).empty());
+  speak(guard);
+  for (std::uint32_t i = 1; i <= kMost; ++i) EXPECT_EQ(kind(announced(i << 8 | 3)), std::vector<int>{kData}) << i;
+  EXPECT_EQ(kind(announced(6u << 8 | 3)), std::vector<int>{kGap}) << "else its number is asked for for ever";
+  EXPECT_EQ(guard.counts().of(Dropped::kEndpoints), 1u);
+  EXPECT_EQ(kind(announced(2u << 8 | 3)), std::vector<int>{kData}) << "one that is known";
+  const PacketBytes hash = ParameterList().guid(0x0070, kSource, 2u << 8 | 3).add(0x0071, {0, 0, 0, 3}).bytes();
+  ASSERT_FALSE(let_in(guard, from().data({0, kPublications, 8, hash, {}}).bytes()).empty());
+  EXPECT_EQ(kind(announced(6u << 8 | 3)), std::vector<int>{kData}) << "one has gone";
+  EXPECT_EQ(kind(announced(7u << 8 | 3)), std::vector<int>{kGap});
+  ASSERT_FALSE(let_in(guard, goodbye()).empty());
+  ASSERT_FALSE(let_in(guard, announcement(participant(100))).empty());
+  EXPECT_EQ(kind(announced(7u << 8 | 3)), std::vector<int>{kData}) << "it has left and come again";
+}
+
 TEST(Guard, AReaderOfAllPartitionsIsNotHeard) {
   const auto of_partition = [](const std::string& name) {
     PacketBytes value;
