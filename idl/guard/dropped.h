@@ -26,8 +26,9 @@ enum class Dropped : std::uint8_t {
   kSecurity,      ///< a security submessage without its head or its tail
   kWildcard,      ///< an endpoint in partitions with wildcards
   kEndpoints,     ///< too many endpoints of one participant
+  kRepairs,       ///< asks for too much of what was sent before
 };
-inline constexpr std::size_t kDroppedReasons = 17;
+inline constexpr std::size_t kDroppedReasons = 18;
 
 /// For people: "statistics submessage".
 [[nodiscard]] const char* name_of(Dropped reason);

@@ -52,14 +52,16 @@ void SentSamples::add(const Fragments& fragments) {
     if (sample.writer == fragments.writer && sample.sequence_number == fragments.sequence_number) return;
     if (sample.sequence_number < into->sequence_number) into = &sample;
   }
-  *into = {fragments.writer, fragments.of_sample(), fragments.sequence_number};
+  *into = {fragments.writer, fragments.of_sample(), fragments.size, fragments.sequence_number};
 }
 
-bool SentSamples::has(std::uint32_t writer, std::int64_t sequence_number, std::uint32_t fragment) const {
-  const Set& set = (*sets_)[place(writer, sequence_number)];
-  return std::any_of(set.begin(), set.end(), [&](const Sample& sample) {
-    return sample.writer == writer && sample.sequence_number == sequence_number && fragment <= sample.fragments;
-  });
+std::uint32_t SentSamples::fragment_bytes(std::uint32_t writer, std::int64_t sequence_number,
+                                          std::uint32_t fragment) const {
+  for (const Sample& sample : (*sets_)[place(writer, sequence_number)]) {
+    if (sample.writer == writer && sample.sequence_number == sequence_number && fragment <= sample.fragments)
+      return sample.size;
+  }
+  return 0;
 }
 
 }  // namespace trammel::wire

@@ -51,12 +51,15 @@ class UnfinishedSamples {
 class SentSamples {
  public:
   void add(const Fragments& fragments);
-  [[nodiscard]] bool has(std::uint32_t writer, std::int64_t sequence_number, std::uint32_t fragment) const;
+  /// Bytes of each fragment of the sample; 0: it has no such one.
+  [[nodiscard]] std::uint32_t fragment_bytes(std::uint32_t writer, std::int64_t sequence_number,
+                                             std::uint32_t fragment) const;
 
  private:
   struct Sample {
     std::uint32_t writer = 0;
     std::uint32_t fragments = 0;
+    std::uint32_t size = 0;            // of a fragment
     std::int64_t sequence_number = 0;  // 0: free
   };
   static constexpr std::size_t kSets = 1024;

@@ -17,7 +17,7 @@ constexpr std::array<const char*, kDroppedReasons> kNames = {"no RTPS message", 
                                                              "counts that jump",      "numbers skipped",
                                                              "too many participants", "fragments that were never sent",
                                                              "security submessages",  "partitions with wildcards",
-                                                             "too many endpoints"};
+                                                             "too many endpoints",    "too much asked for again"};
 
 }  // namespace
 
@@ -76,6 +76,12 @@ void Guard::sent(Bytes message) {
       if (!fragments || fragments->size == 0) continue;
       const MutexLock lock(memory_.mutex);
       memory_.sent.add(*fragments);
+      memory_.repairs.sent(fragments->writer, fragments->sample_size, std::chrono::steady_clock::now());
+    } else if (submessage->id == kData) {
+      Reader reader(submessage->body, submessage->little_endian());
+      static_cast<void>(reader.take(8));  // flags, the reader
+      const MutexLock lock(memory_.mutex);
+      memory_.repairs.sent(reader.entity().value_or(0), submessage->body.size(), std::chrono::steady_clock::now());
     }
   }
 }

@@ -7,6 +7,7 @@
 #include "idl/guard/endpoint_watch.h"
 #include "idl/guard/fragment_watch.h"
 #include "idl/guard/participant_watch.h"
+#include "idl/guard/repair_watch.h"
 #include "idl/guard/sequence_watch.h"
 #include "server/base/mutex.h"
 
@@ -22,6 +23,7 @@ struct GuardMemory {
   SentSamples sent TRAMMEL_GUARDED_BY(mutex);
   ParticipantWatch participants TRAMMEL_GUARDED_BY(mutex);
   EndpointWatch endpoints TRAMMEL_GUARDED_BY(mutex);
+  RepairWatch repairs TRAMMEL_GUARDED_BY(mutex);
   std::array<unsigned char, kPrefix> own TRAMMEL_GUARDED_BY(mutex) = {};  // prefix; zeros: nothing was sent yet
   std::atomic<bool> knows_strangers{false};                               // among `participants`
 

@@ -33,6 +33,7 @@ struct Set {
   std::optional<Dropped> fault;
   std::uint32_t bits = 0;
   std::uint32_t highest = 0;  // from the base; 0 also when none is set
+  int count = 0;              // of those that are set
 };
 Set take_set(Reader& reader) {
   const auto bits = reader.u32();
@@ -44,6 +45,7 @@ Set take_set(Reader& reader) {
     if (!word) return {Dropped::kNumberSet};
     const std::uint32_t used = *bits - 32 * i;  // of this word; the rest of it counts for nothing
     const std::uint32_t set_bits = used >= 32 ? *word : *word & ~(UINT32_MAX >> used);
+    set.count += std::popcount(set_bits);
     if (set_bits != 0) set.highest = 32 * i + 31 - static_cast<std::uint32_t>(std::countr_zero(set_bits));
   }
   return set;
@@ -404,6 +406,12 @@ std::optional<Dropped> MessageCheck::check_gap(const Submessage& submessage) {
   return {};
 }
 
+/// The library sends nothing to those that it does not know.
+bool MessageCheck::may_be_repaired(double bytes) {
+  return !memory_.participants.is_there(source_, received_.now) ||
+         memory_.repairs.may_ask(source_, bytes, received_.now);
+}
+
 std::optional<Dropped> MessageCheck::check_acknack(const Submessage& submessage) {
   constexpr std::uint32_t kAcks = 0x01000000;  // no entity kind: these count apart from HEARTBEATs
   Reader reader(submessage.body, submessage.little_endian());
@@ -411,9 +419,15 @@ std::optional<Dropped> MessageCheck::check_acknack(const Submessage& submessage)
   const auto base = reader.sequence_number();
   if (!head || !base) return Dropped::kLength;
   if (*base < 0 || *base > kLargestNumber) return Dropped::kNumber;
-  if (const Set set = take_set(reader); set.fault) return set.fault;
+  const Set set = take_set(reader);
+  if (set.fault) return set.fault;
   const auto count = reader.u32();
   if (!count) return Dropped::kLength;
+  if (set.count > 0) {
+    const MutexLock lock(memory_.mutex);
+    const std::size_t each = memory_.repairs.sample_bytes(head->writer, received_.now);
+    if (!may_be_repaired(static_cast<double>(each) * set.count)) return Dropped::kRepairs;
+  }
   return check_count(head->reader, head->writer ^ kAcks, *count);
 }
 
@@ -432,7 +446,9 @@ std::optional<Dropped> MessageCheck::check_nack_frag(const Submessage& submessag
   if (std::uint64_t{*base} + kMostBits > UINT32_MAX) return Dropped::kNotSent;
   {
     const MutexLock lock(memory_.mutex);
-    if (!memory_.sent.has(head->writer, *number, *base + set.highest)) return Dropped::kNotSent;
+    const std::uint32_t each = memory_.sent.fragment_bytes(head->writer, *number, *base + set.highest);
+    if (each == 0) return Dropped::kNotSent;
+    if (!may_be_repaired(static_cast<double>(each) * set.count)) return Dropped::kRepairs;
   }
   return check_count(head->reader, head->writer ^ kNacks, *count);
 }

@@ -56,6 +56,7 @@ class MessageCheck {
   Fault check_heartbeat(const Submessage& submessage);
   Fault check_heartbeat_frag(const Submessage& submessage);
   Fault check_gap(const Submessage& submessage);
+  [[nodiscard]] bool may_be_repaired(double bytes) TRAMMEL_REQUIRES(memory_.mutex);
   Fault check_acknack(const Submessage& submessage);
   Fault check_nack_frag(const Submessage& submessage);
   Fault check_statistics(const Submessage& submessage, Bytes behind);

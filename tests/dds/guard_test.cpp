@@ -660,6 +660,46 @@ TEST(Guard, FragmentsThatWereNeverSentAreNotAskedFor) {
   EXPECT_EQ(fate(guard, asks(7, 0, 5)), Dropped::kNumber);
 }
 
+/// A participant that the guard of kOther knows, which has a socket of its own.
+Prefix known_inhabitant(Guard& guard, std::uint16_t number, Guard::Time now) {
+  Prefix prefix = kSource;
+  prefix[10] = static_cast<unsigned char>(number);
+  const ParameterList list = ParameterList().guid(0x0050, prefix, 0x000001c1).add(0x0002, lasting(100));
+  const PacketBytes announced = Packet(prefix).data({0, kAnnouncer, 1, {}, list.payload()}).bytes();
+  EXPECT_TRUE(guard.check(announced, loopback(5000 + number), now));
+  speak(guard, prefix, now);
+  return prefix;
+}
+
+TEST(Guard, WhatWasSentIsNotAskedForAgainWithoutEnd) {
+  Guard guard(kMaxTextSample);
+  constexpr std::uint32_t kBytes = 30u << 20, kSize = 60000;
+  guard.sent(Packet(kOther).fragments({0, kUserWriter, 7, 1, 1, kSize, kBytes, PacketBytes(kSize)}).bytes());
+  Guard::Time now = std::chrono::steady_clock::now();
+  std::uint32_t count = 0;
+  const auto passes = [&](const Packet& message) { return guard.check(message.bytes(), kSocket, now).has_value(); };
+  const auto asks = [&](const Prefix& who, std::uint32_t samples = 1) {
+    return Packet(who).to(kOther).acknack(kUserReader, kUserWriter, 7, samples, ++count);
+  };
+  const Prefix one = known_inhabitant(guard, 1, now), other = known_inhabitant(guard, 2, now);
+  int answered = 0;
+  for (int i = 0; i < 100; ++i) answered += passes(asks(one)) ? 1 : 0;
+  EXPECT_EQ(answered, 5) << "128 MB at once";
+  EXPECT_FALSE(passes(Packet(one).nack_frag(kUserReader, kUserWriter, 7, 1, ++count)));
+  EXPECT_GT(guard.counts().of(Dropped::kRepairs), 90u);
+  EXPECT_TRUE(passes(asks(one, 0))) << "it confirms";
+  EXPECT_TRUE(passes(asks(other))) << "who has asked for little";
+  now += std::chrono::seconds(10);
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(passes(asks(one)));
+  int all = 0;
+  for (std::uint16_t number = 3; number < 23; ++number) {
+    const Prefix who = known_inhabitant(guard, number, now);
+    EXPECT_TRUE(passes(asks(who))) << "each a little";
+    for (int i = 0; i < 10; ++i) all += passes(asks(who)) ? 1 : 0;
+  }
+  EXPECT_LT(all, 60) << "512 MB and half of what each may have";
+}
+
 TEST(Guard, OneSocketDoesNotInventParticipantsWithoutEnd) {
   Guard guard(kMaxTextSample);
   int passed = 0;
