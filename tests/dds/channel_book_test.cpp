@@ -150,6 +150,28 @@ TEST(ChannelBook, AmongFewWhoeverWaitsToBeMatchedAgainWaitsForTwelveSecondsAtMos
   EXPECT_LE(longest, milliseconds(12'400));
 }
 
+TEST(ChannelBook, AParticipantThatComesUnderOneNameAfterTheOtherOpensFewChannels) {
+  Desk desk(4);
+  desk.comes("honest");
+  desk.tend();
+  std::set<std::string> opened;
+  for (int i = 0; i < 2000; ++i) {  // 200 a second
+    const std::string name = "name " + std::to_string(i);
+    desk.book.found({"flapper", name, "PredictError_Reply"}, desk.now);
+    static_cast<void>(desk.book.asked(name, desk.now));
+    desk.tend(milliseconds(5));
+    if (desk.has(name)) opened.insert(name);
+    desk.book.lost({"flapper", name, "PredictError_Reply"});
+    desk.tend();
+  }
+  EXPECT_LE(opened.size(), 30u);
+  EXPECT_GE(opened.size(), 8u) << "who comes again now and then";
+  EXPECT_TRUE(desk.has("honest"));
+  for (const char* name : {"a", "b", "c"}) desk.book.found({"other", name, "PredictError_Reply"}, desk.now);
+  desk.tend();
+  for (const char* name : {"a", "b", "c"}) EXPECT_TRUE(desk.has(name)) << "somebody else";
+}
+
 TEST(ChannelBook, OnlyTheFirstWhoListensInAPartitionIsAnsweredThere) {
   Desk desk(4);
   desk.comes("a");

@@ -6,9 +6,13 @@
 namespace trammel {
 namespace {
 
-constexpr std::size_t kMostKnown = 4096;   // clients; more are heard when some have left
-constexpr int kPartitionsOfOne = 4;        // a participant may be as many clients
-constexpr std::size_t kMostBeside = 64;    // readers of others in a client's partition
+constexpr std::size_t kMostKnown = 4096;  // clients; more are heard when some have left
+constexpr int kPartitionsOfOne = 4;       // a participant may be as many clients
+constexpr std::size_t kMostBeside = 64;   // readers of others in a client's partition
+/// A channel costs all others something, too. A participant may come under so many names at once, and under one more in
+/// each period.
+constexpr int kNamesAtOnce = 8;
+constexpr std::chrono::milliseconds kPeriodOfName{500};
 constexpr std::size_t kOpenedAtOnce = 16;  // so that those who have a channel are not held up
 /// The longest penalty, for each client that is there: a change is told to all of them. Among few it is short, since
 /// some clients send nothing before they are matched.
@@ -23,13 +27,16 @@ void ChannelBook::found(const ReplyReader& reader, SteadyTime now) {
     return found_beside(reader, &known->second);
   }
   if (clients_.size() >= kMostKnown) return;
-  int& partitions = partitions_[reader.participant];
-  if (partitions >= kPartitionsOfOne) return;
-  ++partitions;
+  if (listeners_.size() >= kMostKnown) forget_listeners(now);
+  Listener& listener = listeners_[reader.participant];
+  if (listener.partitions >= kPartitionsOfOne) return;
+  ++listener.partitions;
+  listener.next_free = std::max(listener.next_free, now) + kPeriodOfName;
   Client& client = clients_[reader.partition];
   client.participant = reader.participant;
   client.topics.insert(reader.topic);
-  client.waits_since = now;
+  client.not_before = std::max(now, listener.next_free - kNamesAtOnce * kPeriodOfName);
+  client.waits_since = client.not_before;
 }
 
 void ChannelBook::found_beside(const ReplyReader& reader, Client* client) {
@@ -63,12 +70,16 @@ void ChannelBook::drop(Clients::iterator client) {
     closings_.push_back({Change::Kind::kClose, client->first, {}});
     --open_;
   }
-  const auto partitions = partitions_.find(client->second.participant);
-  if (--partitions->second == 0) partitions_.erase(partitions);
+  --listeners_[client->second.participant].partitions;
   const std::vector<ReplyReader> others = std::move(client->second.others);
   const SteadyTime now = client->second.last_used;
   clients_.erase(client);
   for (const ReplyReader& reader : others) found(reader, now);
+}
+
+void ChannelBook::forget_listeners(SteadyTime now) {
+  std::erase_if(listeners_,
+                [now](const auto& entry) { return entry.second.partitions == 0 && entry.second.next_free <= now; });
 }
 
 bool ChannelBook::may_listen(const std::string& participant, const std::string& partition) const {
@@ -90,7 +101,7 @@ bool ChannelBook::asked(const std::string& partition, SteadyTime now) {
   client.was_useful = true;
   if (client.is_open || client.asks) return false;
   client.asks = true;
-  client.waits_since = std::min(client.waits_since, now);
+  client.waits_since = std::max(client.not_before, std::min(client.waits_since, now));
   return true;
 }
 

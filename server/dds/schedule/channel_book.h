@@ -23,8 +23,8 @@ struct ReplyReader {
 /// Who listens where, and which clients have a reply channel. Only the participant that was the first to listen in a
 /// partition gets replies there. When there are more clients than channels, those take turns that do nothing: the one
 /// whose last request is longest ago makes room for the one that has waited longest, a client that asked first. Whoever
-/// had a channel for nothing waits longer each time, 12 s at most among few clients and 30 s among hundreds. Not
-/// thread-safe.
+/// had a channel for nothing waits longer each time, and so does who comes under one name after the other, 12 s at most
+/// among few clients and 30 s among hundreds. Not thread-safe.
 class ChannelBook {
  public:
   /// `grace`: nobody loses a channel sooner than this after it was opened or used.
@@ -66,7 +66,13 @@ class ChannelBook {
     int at_work = 0;           // requests that are not answered
     SteadyTime last_used{};    // or opened
     SteadyTime waits_since{};  // may lie ahead: it waits its turn
+    SteadyTime not_before{};   // its participant has come under many names
     SteadyTime::duration penalty{0};
+  };
+  /// A participant, which may be several clients.
+  struct Listener {
+    int partitions = 0;      // that it listens in
+    SteadyTime next_free{};  // when its next partition would cost nothing; may lie ahead
   };
   using Clients = std::map<std::string, Client>;
   [[nodiscard]] Clients::iterator first_waiting(SteadyTime now);
@@ -75,12 +81,13 @@ class ChannelBook {
   void close(Clients::iterator client, SteadyTime now, std::vector<Change>* changes);
   void drop(Clients::iterator client);
   void found_beside(const ReplyReader& reader, Client* client);
+  void forget_listeners(SteadyTime now);
 
   const std::size_t capacity_;
   const SteadyTime::duration grace_;
-  Clients clients_;                        // by partition
-  std::map<std::string, int> partitions_;  // of a participant
-  std::vector<Change> closings_;           // of clients that have left
+  Clients clients_;                            // by partition
+  std::map<std::string, Listener> listeners_;  // by participant
+  std::vector<Change> closings_;               // of clients that have left
   std::size_t open_ = 0;
 };
 
