@@ -1,6 +1,4 @@
 // To whom a gate sends what the library would send to everybody.
-#include "idl/domain_gate.h"
-
 #include <fastdds/rtps/network/SenderResource.h>
 #include <fastdds/rtps/transport/ChainingTransport.h>
 #include <fastdds/rtps/transport/TransportReceiverInterface.h>
@@ -14,6 +12,7 @@
 #include <vector>
 
 #include "idl/askers.h"
+#include "idl/domain_gate.h"
 #include "idl/participant.h"
 #include "tests/support/rtps_packet.h"
 
