@@ -154,7 +154,7 @@ struct Session::Participant {
       typename Operation::Request::type request;
       request.about(to_wire(context));
       for (std::size_t i = first; i < first + count; ++i) put(request).push_back(items[i]);
-      const auto reply = call<Operation>(request, {context.cell});
+      const auto reply = call<Operation>(request, {context.cell, {}});
       if (!reply) return tl::make_unexpected(reply.error());
       if (get(*reply).size() != count) {
         return failure(ErrorCode::kInternal, "server {} answered {} items for {}", reply->header().server().to_string(),
