@@ -142,7 +142,7 @@ Result<std::vector<std::string>> Trainer::start() {
       queue_.put_down();
       // Asked for while its attempt ended: it waits again, and nobody told it.
       if (end == JobRunner::End::kAgain && taken->cancelled.stop_requested())
-        static_cast<void>(cancel(taken->job.id, queue_.cancelled_by()));
+        static_cast<void>(cancel(taken->job.id, {"", "", queue_.cancelled_by()}));
     }
   });
   if (store_.is_shared()) {
