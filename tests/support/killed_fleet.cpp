@@ -328,7 +328,8 @@ json end_of(const Fleet& fleet, const std::string& cell) {
               {"batches", json::object()},
               {"jobs", json::object()},
               {"changes", json::array()},
-              {"twice", json::array()}};
+              {"twice", json::array()},
+              {"order", json::array()}};
   const std::string of_cell = fmt::format(" WHERE cell = '{}' ", cell);
   for (const auto& row : fleet.rows("SELECT id, hash FROM batches" + of_cell))
     end["batches"][row.at(0)] = {{"hash", row.at(1)}};
@@ -343,6 +344,9 @@ json end_of(const Fleet& fleet, const std::string& cell) {
   for (const auto& row : fleet.rows("SELECT substring(after FROM 'of job [0-9]+') FROM audit" + of_cell +
                                     "AND what = 'model' GROUP BY 1 HAVING COUNT(*) > 1"))
     end["twice"].push_back(row.at(0));
+  for (const auto& row : fleet.rows("SELECT CASE WHEN what = 'model' THEN subject ELSE request END FROM audit" +
+                                    of_cell + "AND what IN ('model', 'activate', 'rollback') ORDER BY number"))
+    end["order"].push_back(row.at(0));
   return end;
 }
 
