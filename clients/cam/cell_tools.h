@@ -18,6 +18,7 @@ struct CellTools {
   std::optional<Pose> X_WB = {};  ///< the cell's base, seen from its measuring system; empty: found from the data
   /// Refuses a tool and payload that the model has not learned with; empty: it knows all.
   std::function<Status(const std::string& tool, const std::string& payload)> check_known = {};
+  std::optional<Vector3> gravity_B = {};  ///< unit vector, seen from the robot's base; empty: not known
 };
 
 struct ToolChoice {

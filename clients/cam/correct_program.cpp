@@ -41,10 +41,12 @@ JointVector from_wire(const std::vector<double>& wire, const Chain& robot) {
 }
 
 /// Of degrees.
-std::vector<double> axes_of(Coordinates coordinates, std::vector<double> axes) {
-  if (coordinates == Coordinates::kJointRadians) {
+std::vector<double> axes_of(const ProgramTarget& target, std::vector<double> axes) {
+  if (target.coordinates == Coordinates::kJointRadians) {
     for (double& axis : axes) axis = from_deg(axis);
   }
+  for (std::size_t k = 0; k < std::min(axes.size(), target.pulses_per_deg.size()); ++k)
+    axes[k] *= target.pulses_per_deg[k];
   return axes;
 }
 
@@ -142,7 +144,7 @@ class Correcting {
     }
     const std::vector<double> exact =
         is_joints(target.coordinates)
-            ? axes_of(target.coordinates, arm_.to_axes(q))
+            ? axes_of(target, arm_.to_axes(q))
             : numbers_of(target.coordinates, program_.frames[target.frame].X_BO.inverse() * X_BT, target.numbers);
     if (!std::all_of(exact.begin(), exact.end(), [](double number) { return std::isfinite(number); })) {
       row.status = "refused";
@@ -182,8 +184,9 @@ class Correcting {
         const Slot& slot = rewrite.slots[k];
         const double value = exact[slot.value];
         const NumberStyle style =
-            options_.keep_digits ? slot.style
-                                 : with_rounding(value, slot.style, largest_rounding(target, slot.value, row.sigma_mm));
+            options_.keep_digits || target.coordinates == Coordinates::kJointPulses
+                ? slot.style
+                : with_rounding(value, slot.style, largest_rounding(target, slot.value, row.sigma_mm));
         const std::string number = number_text(value, style);
         if (const auto written = read_number(number)) row.after[slot.value] = written->value;
         text += number;
@@ -202,7 +205,7 @@ class Correcting {
           (pose_of(target.coordinates, written).translation() - pose_of(target.coordinates, exact).translation())
               .norm());
     }
-    const auto rounded = arm_.from_axes(in_degrees(target.coordinates, written), target.external);
+    const auto rounded = arm_.from_axes(in_degrees(target, written), target.external);
     if (!rounded) return 0;
     const Pose X_FT = X_TF.inverse();
     return to_mm(

@@ -162,9 +162,23 @@ class Finding {
   /// What the target does not say follows from the motion before in this file, wherever the targets stand.
   void by_configuration(std::size_t t, std::size_t file) {
     std::optional<JointVector>& previous = last_[file];
+    if (!done_[t] && !previous) note_beginning(t);
     if (!done_[t] && prepare(t)) take(t, as_said(t, previous));
     done_[t] = true;
     if (found_.targets[t].q) previous = found_.targets[t].q;
+  }
+
+  /// Where a program begins without saying it, the robot stays in the posture that it stands in.
+  void note_beginning(std::size_t t) {
+    const ProgramTarget& target = program_.targets[t];
+    const bool may_say_it = program_.dialect == "krl" || program_.dialect == "inform";
+    if (noted_beginning_ || !may_say_it || target.configuration.said() || is_joints(target.coordinates)) return;
+    noted_beginning_ = true;
+    found_.notes.push_back(
+        fmt::format("{} ({} line {}): the program begins there and does not say the arm's posture. The one nearest to "
+                    "joints of zero "
+                    "is taken, the robot takes the one that it stands in",
+                    shown(target.name), program_.files[target.file].name, target.line));
   }
 
   /// A target whose joints the controller chooses by those before it. All ways to it must lead to the same.
@@ -239,7 +253,7 @@ class Finding {
       return false;
     }
     if (!is_joints(target.coordinates)) return true;
-    const auto q = arm_.from_axes(in_degrees(target.coordinates, target.numbers), target.external);
+    const auto q = arm_.from_axes(in_degrees(target, target.numbers), target.external);
     if (!q) {
       found.why_not = "the program does not say where the rail is";
       return false;
@@ -292,7 +306,7 @@ class Finding {
   std::map<std::size_t, std::optional<JointVector>> last_;  ///< by file
   std::vector<bool> done_;
   std::vector<std::optional<Stand>> stands_;  ///< behind each motion; empty: not followed yet
-  bool changed_ = false, noted_as_said_ = false;
+  bool changed_ = false, noted_as_said_ = false, noted_beginning_ = false;
 };
 
 }  // namespace
@@ -311,10 +325,17 @@ std::vector<double> in_degrees(Coordinates coordinates, std::vector<double> axes
   return axes;
 }
 
+std::vector<double> in_degrees(const ProgramTarget& target, std::vector<double> axes) {
+  for (std::size_t k = 0; k < std::min(axes.size(), target.pulses_per_deg.size()); ++k)
+    axes[k] /= target.pulses_per_deg[k];
+  return in_degrees(target.coordinates, std::move(axes));
+}
+
 Result<NominalTargets> nominal_targets(const Program& program, const ArmOfProgram& arm, const CellTools& cell,
                                        const std::string& tool, const std::string& payload, BareTools bare) {
   if (const Status whole = check_files(program); !whole) return tl::make_unexpected(whole.error());
   if (const Status same = check_stated_robot(program, arm.robot()); !same) return tl::make_unexpected(same.error());
+  if (const Status upright = check_gravity(program, cell); !upright) return tl::make_unexpected(upright.error());
   std::vector<ToolUse> uses(program.tools.size(), ToolUse::kNone);
   for (const ProgramTarget& target : program.targets) {
     const bool joints = bare == BareTools::kOfTheCell && is_joints(target.coordinates);

@@ -53,5 +53,6 @@ struct TargetGroup {
 [[nodiscard]] std::vector<double> joints_on_wire(const JointVector& q, const Chain& robot);
 /// Axes of a joint target in degrees, whatever its dialect writes.
 [[nodiscard]] std::vector<double> in_degrees(Coordinates coordinates, std::vector<double> axes);
+[[nodiscard]] std::vector<double> in_degrees(const ProgramTarget& target, std::vector<double> axes);
 
 }  // namespace trammel::cam

@@ -22,6 +22,11 @@ bool is_utf16(const std::string& text) {
   return zeros(0) != zeros(1);
 }
 
+std::string lower(std::string text) {
+  for (char& c : text) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
+  return text;
+}
+
 double near_turn(double angle, double like) { return angle + 360 * std::round((like - angle) / 360); }
 
 /// Of the two ways to write a rotation the one nearer to `like`. Where the middle angle is ±90 deg only a sum of the
@@ -65,7 +70,8 @@ Vector3 nearest_rotation_vector(const Matrix3& R, const Vector3& like) {
 }  // namespace
 
 bool is_joints(Coordinates coordinates) {
-  return coordinates == Coordinates::kJoints || coordinates == Coordinates::kJointRadians;
+  return coordinates == Coordinates::kJoints || coordinates == Coordinates::kJointRadians ||
+         coordinates == Coordinates::kJointPulses;
 }
 
 std::string pose_text(const Pose& X) {
@@ -135,7 +141,9 @@ std::size_t add_once(Program& program, ProgramTool tool) {
 std::size_t add_once(Program& program, ProgramFrame frame) {
   for (std::size_t k = 0; k < program.frames.size(); ++k) {
     const ProgramFrame& known = program.frames[k];
-    if (known.name == frame.name && known.why_not == frame.why_not && known.X_BO.isApprox(frame.X_BO, 1e-12)) return k;
+    if (lower(known.name) == lower(frame.name) && known.why_not == frame.why_not &&
+        known.X_BO.isApprox(frame.X_BO, 1e-12))
+      return k;
   }
   program.frames.push_back(std::move(frame));
   return program.frames.size() - 1;
@@ -308,6 +316,7 @@ Pose pose_of(Coordinates coordinates, const std::vector<double>& numbers) {
       return make_pose(rotation_exp(vector_of(numbers, 3)), p);
     case Coordinates::kJoints:
     case Coordinates::kJointRadians:
+    case Coordinates::kJointPulses:
       break;
   }
   return Pose::Identity();
@@ -341,6 +350,7 @@ std::vector<double> numbers_of(Coordinates coordinates, const Pose& pose, const 
     }
     case Coordinates::kJoints:
     case Coordinates::kJointRadians:
+    case Coordinates::kJointPulses:
       break;
   }
   return like;

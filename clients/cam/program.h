@@ -31,7 +31,8 @@ enum class Coordinates {
   kAnglesXyz,       ///< x y z mm, deg about X, Y, Z as they stand (FANUC W P R, Yaskawa Rx Ry Rz)
   kRotationVector,  ///< x y z m, rotation vector rad (Universal Robots)
   kJoints,          ///< axes of the arm, deg
-  kJointRadians     ///< the same, rad
+  kJointRadians,    ///< the same, rad
+  kJointPulses      ///< the same, as the controller counts its encoders (Yaskawa)
 };
 [[nodiscard]] bool is_joints(Coordinates coordinates);
 
@@ -143,7 +144,8 @@ struct ProgramTarget {
   Coordinates coordinates = Coordinates::kQuaternion;
   std::vector<double> numbers;  ///< of the whole pose, in the dialect's units
   Configuration configuration = {};
-  std::map<int, double> external;  ///< mm or deg as stated, by axis from 0
+  std::map<int, double> external;           ///< mm or deg as stated, by axis from 0
+  std::vector<double> pulses_per_deg = {};  ///< of each axis, where its numbers are pulses
   std::vector<Rewrite> rewrites;
   bool folded = false;         ///< was computed by the program from other targets
   std::string comment;         ///< a line to insert above `comment_at`, without its end; empty: none
@@ -193,6 +195,14 @@ struct Reading {
   bool motion = false;  ///< it is a motion, which goes to what is made of it
 };
 
+/// Which way a program says that up is, as its robot is mounted.
+struct StatedUp {
+  Vector3 up_B = Vector3::UnitZ();  ///< unit vector, seen from the robot's base
+  std::string name;                 ///< `set_gravity`
+  std::string file;
+  int line = 0;
+};
+
 /// What shows that a file is not whole.
 struct Cut {
   std::size_t file = 0;
@@ -214,6 +224,7 @@ struct StatedRobot {
   std::vector<StatedNumber> numbers;
   std::vector<StatedType> types;
   std::vector<StatedCoupling> couplings;
+  std::vector<StatedUp> ups;
 };
 
 struct Program : StatedRobot {
@@ -241,6 +252,8 @@ struct ReadOptions {
   std::set<std::string> spared = {};        ///< files that are read and not written
   std::vector<std::string> idle_axes = {};  ///< external axes that carry neither robot nor part, by axis_called()
   StatedRobot stated = {};                  ///< by files that are no programs
+  std::vector<SourceFile> beside = {};      ///< read for what they say of values: other tasks, system variables
+  std::vector<double> pulses_per_deg = {};  ///< of each axis, as the controller counts them; empty: not told
 };
 
 /// Refuses files in UTF-16, lines that end in CR alone (readers count by LF, and comments end with it), and a file that
@@ -273,7 +286,7 @@ struct FramesRows {
 
 /// The number of a tool in the program's list, where it is put if no tool of that name, place and load is there.
 std::size_t add_once(Program& program, ProgramTool tool);
-/// The same of a frame: of that name and pose.
+/// The same of a frame: of that name, whatever its case, and pose.
 std::size_t add_once(Program& program, ProgramFrame frame);
 /// `spindle`, `spindle carrying lPart`
 [[nodiscard]] std::string called(const ProgramTool& tool);

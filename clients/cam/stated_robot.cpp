@@ -20,6 +20,13 @@ namespace {
 constexpr double kSameLength = 1e-4;  // m: both are the drawing's
 constexpr std::size_t kFewest = 3;    // digits of a reach: R2700, R900
 constexpr double kSameReach = 0.06;   // m: 0.58 is also called 0.6
+constexpr double kSameUp = 0.09;      // rad: 5 deg
+
+double angle_between(const Vector3& a, const Vector3& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
+
+std::string direction_text(const Vector3& direction) {
+  return fmt::format("({:.2f}, {:.2f}, {:.2f})", direction.x() + 0.0, direction.y() + 0.0, direction.z() + 0.0);
+}
 
 std::string place_of(const StatedBase& base) {
   return base.line == 0 ? fmt::format("{} of {}", base.name, base.file)
@@ -207,6 +214,7 @@ void take_stated(const StatedRobot& stated, StatedRobot& all) {
   all.numbers.insert(all.numbers.end(), stated.numbers.begin(), stated.numbers.end());
   all.types.insert(all.types.end(), stated.types.begin(), stated.types.end());
   all.couplings.insert(all.couplings.end(), stated.couplings.begin(), stated.couplings.end());
+  all.ups.insert(all.ups.end(), stated.ups.begin(), stated.ups.end());
 }
 
 void stand_in_world(Program& program, const ReadOptions& options) {
@@ -243,6 +251,24 @@ Status check_stated_robot(const Program& program, const Chain& robot) {
   return {};
 }
 
+Status check_gravity(const Program& program, const CellTools& cell) {
+  std::vector<Error> problems;
+  for (const StatedUp& up : program.ups) {
+    const double apart = cell.gravity_B ? angle_between(up.up_B, -*cell.gravity_B) : 0;
+    if (apart <= kSameUp) continue;
+    problems.push_back(refused("by {} up is {} in the robot's base, by the cell's base and gravity it is {}: the robot "
+                               "is mounted {:.0f} deg otherwise",
+                               up.name, direction_text(up.up_B), direction_text(-*cell.gravity_B), to_deg(apart))
+                           .in(up.file)
+                           .at_row(up.line)
+                           .of(up.name)
+                           .next("mend the one that is wrong")
+                           .value());
+  }
+  if (!problems.empty()) return tl::make_unexpected(together(std::move(problems)));
+  return {};
+}
+
 std::vector<std::string> notes_on_base(const Program& program, const CellTools& cell) {
   if (program.bases.empty() || same_place(program.bases.front().X_WB, Pose::Identity())) return {};
   const StatedBase& base = program.bases.front();
@@ -252,6 +278,13 @@ std::vector<std::string> notes_on_base(const Program& program, const CellTools& 
   if (cell.X_WB && !same_place(*cell.X_WB, base.X_WB))
     stands += fmt::format("; the cell's base, {}, is seen from its measuring system", pose_text(*cell.X_WB));
   std::vector<std::string> notes = {stands};
+  const Vector3 up_B = base.X_WB.linear().transpose() * Vector3::UnitZ();
+  const double tilted = cell.gravity_B ? angle_between(up_B, -*cell.gravity_B) : 0;
+  if (tilted > kSameUp)
+    notes.push_back(
+        fmt::format("by {} up is {} in the robot's base, by the cell's base and gravity it is {}, {:.0f} "
+                    "deg off: see that the model is of a robot that is mounted so",
+                    place_of(base), direction_text(up_B), direction_text(-*cell.gravity_B), to_deg(tilted)));
   std::vector<std::string> rows;
   for (const ProgramFrame& frame : program.frames) {
     if (frame.in_base && !frame.row.empty()) rows.push_back(shown(frame.row));

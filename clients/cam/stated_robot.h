@@ -20,6 +20,9 @@ void stand_in_world(Program& program, const ReadOptions& options);
 /// with both places and values.
 [[nodiscard]] Status check_stated_robot(const Program& program, const Chain& robot);
 
+/// Refuses a program that says of its robot that it is mounted otherwise than the cell's base and gravity do.
+[[nodiscard]] Status check_gravity(const Program& program, const CellTools& cell);
+
 /// Where the robot was taken to stand, where that is not the origin of the controller's world; a sentence each.
 [[nodiscard]] std::vector<std::string> notes_on_base(const Program& program, const CellTools& cell);
 

@@ -95,6 +95,18 @@ TEST_F(BackupAsProgram, OfTwoRobotsATaskSaysWhich) {
   EXPECT_NE(corrected("TASK7").refusal.find("no programs of a task TASK7"), std::string::npos);
 }
 
+TEST_F(BackupAsProgram, WhatAnotherTaskSetsOfASharedPersistentCountsThoughItIsNotTaken) {
+  write_parameters(robot("1", "") + robot("2", ""));
+  const std::string other = module_of("B");
+  folder_.write("backup/RAPID/TASK2/PROGMOD/b.mod", other);
+  EXPECT_TRUE(test::row_of(corrected("TASK1").program, "p10").corrected());
+  std::string sets = other;
+  sets.insert(sets.find("    MoveL"), "    tSpindle.tframe.trans.z:=nWear;\n");
+  folder_.write("backup/RAPID/TASK2/PROGMOD/b.mod", sets);
+  const std::string why = test::row_of(corrected("TASK1").program, "p10").message;
+  EXPECT_NE(why.find("tSpindle is set at run time (RAPID/TASK2/PROGMOD/b.mod line 5)"), std::string::npos) << why;
+}
+
 TEST_F(BackupAsProgram, AnotherRobotThanTheCellsIsRefusedByTypeAndByAxes) {
   write_parameters(robot("1", "", "910SC_0.65_6", 4));
   const std::string scara = corrected().refusal;

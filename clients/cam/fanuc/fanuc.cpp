@@ -1,12 +1,14 @@
 #include "clients/cam/fanuc/fanuc.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <set>
 
+#include "clients/cam/fanuc/system_frames.h"
 #include "clients/cam/flow.h"
 #include "clients/cam/scan.h"
 #include "clients/cam/sites.h"
@@ -63,7 +65,10 @@ struct Controller {
     std::string first;  ///< where
     int count = 0;
   };
-  std::map<std::string, Statements> loads;  ///< of PAYLOAD[n]
+  std::map<std::string, Statements> loads;           ///< of PAYLOAD[n]
+  std::map<std::string, fanuc::SystemFrame> system;  ///< UFRAME[n] and UTOOL[n] of the system variables
+  std::map<std::string, std::string> taken;          ///< those of them that targets have, with the file
+  std::set<std::string> programs;                    ///< that are read, by name
 };
 bool is_number(const std::string& text) {
   return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
@@ -74,7 +79,7 @@ double number(const Piece& piece) {
   return written ? written->value : 0;
 }
 
-constexpr const char* kDecided = "a branch, a jump or a loop of the program decides it";
+constexpr const char* kDecided = "a branch, a jump or a loop of the program, or a caller, decides it";
 
 /// `-12.5`, `(-12.5)`, up to the end of a statement.
 std::optional<double> constant_at(const Pieces& statement, std::size_t at) {
@@ -133,6 +138,7 @@ class File {
 
   /// Its positions, and what it sets.
   void read() {
+    note_name();
     const Part motions = part_of("/MN"), positions = part_of("/POS");
     program_.mark_places.push_back({motions.begin, "   0:  !", " ;", true});
     read_positions(pieces_of(text_, positions.begin, positions.end, positions.line, {"", "'\""}));
@@ -141,19 +147,46 @@ class File {
     for (const Pieces& statement : statements_) note_setting(statement);
   }
 
-  /// When all files are read.
-  void read_motions() {
-    std::vector<Step> steps;
-    for (const Pieces& statement : statements_) {
-      const Step& step = steps.emplace_back(step_of(statement));
-      const bool jumps = step.kind == Step::Kind::kJump || step.kind == Step::Kind::kJumpMaybe;
-      jumps_anywhere_ |= jumps && !is_number(step.label);
-      note_load(statement);
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] std::size_t statements() const { return statements_.size(); }
+
+  /// What a statement does to the order, when all files are read. A call on a condition makes a block.
+  [[nodiscard]] std::vector<Step> steps_of(std::size_t s) {
+    const Pieces& statement = statements_[s];
+    note_load(statement);
+    if (const std::string called = called_by(statement); controller_.programs.contains(called)) {
+      const Step call{Step::Kind::kCall, called};
+      if (statement[0].is("CALL")) return {call};
+      return {{Step::Kind::kIf}, call, {Step::Kind::kEnd}};
     }
-    const std::vector<Selected> selected = states_before(
-        flow_of(steps), Selected{}, [&](std::size_t s, Selected& state) { select(statements_[s], state); }, join);
-    for (std::size_t s = 0; s < statements_.size(); ++s) motion(statements_[s], selected[s]);
-    finish();
+    Step step = step_of(statement);
+    const bool jumps = step.kind == Step::Kind::kJump || step.kind == Step::Kind::kJumpMaybe;
+    jumps_anywhere_ |= jumps && !is_number(step.label);
+    if (jumps || step.kind == Step::Kind::kLabel) step.label = fmt::format("{}:{}", index_, step.label);
+    return {step};
+  }
+
+  /// `UFRAME_NUM=1`, `UTOOL_NUM=R[2]`, `CALL SUB`
+  void select(std::size_t s, Selected& selected) const { select(statements_[s], selected); }
+  static void join(Selected& state, const Selected& other, const std::string&) {
+    if (state.frame != other.frame) state.frame = kDecided;
+    if (state.tool != other.tool) state.tool = kDecided;
+    if (state.beside.empty()) state.beside = other.beside;
+    if (state.follows.empty()) state.follows = other.follows;
+  }
+
+  void motion(std::size_t s, const Selected& selected) { motion(statements_[s], selected); }
+
+  /// Behind all motions.
+  void finish() {
+    for (const auto& known : positions_) {
+      const auto& [begin, position] = known;
+      const std::string& name = position.name;
+      const bool listed = std::any_of(program_.left.begin(), program_.left.end(),
+                                      [&](const LeftAlone& left) { return left.file == index_ && left.name == name; });
+      if (!used_.contains(begin) && !listed)
+        program_.left.push_back({position.name, index_, position.line, "", "no motion in these files goes to it"});
+    }
   }
 
   std::string describe(const Site& site, ProgramTarget& target) const {
@@ -184,6 +217,31 @@ class File {
   }
 
  private:
+  /// `/PROG  WELD1`; of a file without it its own name.
+  void note_name() {
+    const std::size_t head = text_.find("/PROG");
+    const std::size_t end = head == std::string::npos ? head : text_.find('\n', head);
+    const Pieces pieces =
+        head == std::string::npos ? Pieces{} : pieces_of(text_, head, std::min(end, text_.size()), 1, {"", ""});
+    const std::string& file = program_.files[index_].name;
+    const std::size_t folder = file.rfind('/') + 1;
+    name_ = in_capitals(pieces.size() > 2 ? std::string(pieces[2].text)
+                                          : file.substr(folder, file.rfind('.') - std::min(folder, file.rfind('.'))));
+    controller_.programs.insert(name_);
+  }
+  static std::string in_capitals(std::string text) {
+    for (char& c : text) c = static_cast<char>(c >= 'a' && c <= 'z' ? c - 'a' + 'A' : c);
+    return text;
+  }
+
+  /// `CALL SUB(1)`, `IF R[1]=1,CALL SUB`; empty: it calls nothing.
+  static std::string called_by(const Pieces& statement) {
+    for (std::size_t at = 0; at + 1 < statement.size(); ++at) {
+      if (statement[at].is("CALL")) return in_capitals(std::string(statement[at + 1].text));
+    }
+    return "";
+  }
+
   struct Part {
     std::size_t begin = 0, end = 0;
     int line = 1;
@@ -321,26 +379,111 @@ class File {
     return at + 2 < pieces.size() ? std::string(pieces[at + 2].text) : std::string();
   }
 
-  /// `UFRAME_NUM=1`, `UTOOL_NUM=R[2]`, `CALL SUB`
   void select(const Pieces& statement, Selected& selected) const {
     const bool monitors = statement.size() > 1 && statement[0].is("MONITOR") && !statement[1].is("END");
     const bool names = statement.size() > 2 && (statement[0].is("ERROR_PROG") || statement[0].is("RESUME_PROG"));
     if (monitors) selected.beside = fmt::format("MONITOR {}", shown(statement[1].text));
     if (names) selected.beside = fmt::format("{}={}", statement[0].text, shown(statement[2].text));
-    const bool touched = statement.size() > 2 && statement[0].is("Touch") && statement[1].is("Offset");
-    if (touched || (statement.size() > 1 && (statement[0].is("Track") || statement[0].is("TRACK")))) {
-      const Piece& last = statement[touched ? 2 : 1];
+    const bool offset = statement.size() > 2 && (statement[0].is("Touch") || statement[0].is("MP")) &&
+                        (statement[1].is("Offset") || statement[1].is("OFFSET"));
+    static const std::set<std::string_view> kFollows = {"Track", "TRACK", "SOFTFLOAT"};
+    if (offset || (statement.size() > 1 && kFollows.contains(statement[0].text))) {
+      const Piece& last = statement[offset ? 2 : 1];
       const bool ends = last.is("End") || last.is("END");
-      selected.follows =
-          ends ? "" : fmt::format("{} {} (line {})", statement[0].text, shown(statement[1].text), statement[0].line);
+      const std::string what = last.is("[") ? "" : " " + shown(statement[1].text);
+      selected.follows = ends ? "" : fmt::format("{}{} (line {})", statement[0].text, what, statement[0].line);
     }
     for (std::size_t at = 0; at + 1 < statement.size(); ++at) {
-      if (!statement[at].is("CALL") && !statement[at].is("RUN")) continue;
+      const bool calls = statement[at].is("CALL") && !controller_.programs.contains(called_by(statement));
+      if (!calls && !statement[at].is("RUN")) continue;
       selected.frame = selected.tool =
           fmt::format("{} {} may select another one", statement[at].text, statement[at + 1].text);
     }
+    if (const std::string macro = macro_in(statement); !macro.empty())
+      selected.frame = selected.tool =
+          fmt::format("{} (line {}) is not known here: it may select another one", shown(macro), statement[0].line);
     if (statement[0].is("LBL") && jumps_anywhere_) selected.frame = selected.tool = kDecided;
     select_number(statement, selected);
+  }
+
+  /// `GRIPPER OPEN`: a macro is called by its name, of any words. Empty: it is an instruction that is known.
+  static std::string macro_in(const Pieces& statement) {
+    static const std::set<std::string_view> kKnown = {"J",
+                                                      "L",
+                                                      "C",
+                                                      "A",
+                                                      "S",
+                                                      "LBL",
+                                                      "JMP",
+                                                      "IF",
+                                                      "ELSE",
+                                                      "ENDIF",
+                                                      "FOR",
+                                                      "ENDFOR",
+                                                      "SELECT",
+                                                      "WAIT",
+                                                      "CALL",
+                                                      "RUN",
+                                                      "END",
+                                                      "ABORT",
+                                                      "PAUSE",
+                                                      "OVERRIDE",
+                                                      "MESSAGE",
+                                                      "UALM",
+                                                      "RSR",
+                                                      "PAYLOAD",
+                                                      "UFRAME_NUM",
+                                                      "UTOOL_NUM",
+                                                      "Arc",
+                                                      "ARC",
+                                                      "Weave",
+                                                      "WEAVE",
+                                                      "Track",
+                                                      "TRACK",
+                                                      "Touch",
+                                                      "TOUCH",
+                                                      "Search",
+                                                      "SEARCH",
+                                                      "SPOT",
+                                                      "BACKUP",
+                                                      "COL",
+                                                      "SKIP",
+                                                      "OFFSET",
+                                                      "TOOL_OFFSET",
+                                                      "MONITOR",
+                                                      "ERROR_PROG",
+                                                      "RESUME_PROG",
+                                                      "LOCK",
+                                                      "UNLOCK",
+                                                      "SOFTFLOAT",
+                                                      "MP",
+                                                      "TORQ_LIMIT",
+                                                      "STOP_TRACKING",
+                                                      "VISION",
+                                                      "TIMER",
+                                                      "VOFFSET",
+                                                      "LINE",
+                                                      "SYNC",
+                                                      "JOINT_MAX_SPEED",
+                                                      "LINEAR_MAX_SPEED",
+                                                      "FORCE",
+                                                      "SENSOR",
+                                                      "DIAG",
+                                                      "POINT_LOGIC",
+                                                      "LINECOUNT",
+                                                      "TOOL_OFFSET_CONDITION",
+                                                      "CLEAR",
+                                                      "TC_ONLINE",
+                                                      "RESET",
+                                                      "PULSE",
+                                                      "RETURN"};
+    const Piece& first = statement[0];
+    const bool is_name = first.kind == Piece::Kind::kWord && first.text[0] != '$' && !kKnown.contains(first.text);
+    const bool sets = statement.size() > 1 && (statement[1].is("[") || statement[1].is("="));
+    if (!is_name || sets) return "";
+    return statement.size() > 1 && statement[1].kind == Piece::Kind::kWord
+               ? fmt::format("{} {}", first.text, statement[1].text)
+               : std::string(first.text);
   }
 
   /// `UFRAME_NUM=1`, `UTOOL_NUM[GP1]=R[2]`, `IF (DI[1]),UFRAME_NUM=2`
@@ -362,12 +505,6 @@ class File {
                                                    program_.files[index_].name, statement[at].line);
     std::string& number = frame ? selected.frame : selected.tool;
     number = at == 0 || number == now ? now : kDecided;
-  }
-  static void join(Selected& state, const Selected& other, const std::string&) {
-    if (state.frame != other.frame) state.frame = kDecided;
-    if (state.tool != other.tool) state.tool = kDecided;
-    if (state.beside.empty()) state.beside = other.beside;
-    if (state.follows.empty()) state.follows = other.follows;
   }
   /// What is selected where a program beside may select another one.
   static std::string with(const std::string& selected, const std::string& beside) {
@@ -478,11 +615,12 @@ class File {
     std::string why;
     bool by_program = false;  ///< the programs decide the value, known or not
     std::string where;
+    std::string file = {};
+    int line = 0;
   };
   [[nodiscard]] Told setting(const std::string& name) const {
     const Setting* set = setting_of(name);
-    if (set == nullptr)
-      return {{}, fmt::format("{} is not in the files handed over: --frames tells its value", name), false, ""};
+    if (set == nullptr) return by_system(name);
     if (!set->changed.empty()) return {{}, set->changed, true, ""};
     const Register* from = register_of(set->from);
     std::vector<double> numbers;
@@ -495,6 +633,17 @@ class File {
     // What no file says of a register a row may say.
     const bool open = from == nullptr && set->from.starts_with("PR[") && !set->from.ends_with("[*]");
     return {{}, why, !open, ""};
+  }
+
+  /// Of the controller's system variables.
+  [[nodiscard]] Told by_system(const std::string& name) const {
+    const auto known = controller_.system.find(name);
+    if (known == controller_.system.end())
+      return {{}, fmt::format("{} is not in the files handed over: --frames tells its value", name), false, ""};
+    const fanuc::SystemFrame& frame = known->second;
+    if (!frame.why_not.empty()) return {{}, frame.why_not, true, ""};
+    controller_.taken.emplace(name, frame.file);
+    return {frame.X, "", true, fmt::format("{} line {}", frame.file, frame.line), frame.file, frame.line};
   }
 
   [[nodiscard]] static std::string why_not_by_row(const std::string& row, const Pose& X, const Told& told,
@@ -535,7 +684,8 @@ class File {
       tool.why_not = why_not_by_row(tool.name, *tool.X_FT, told, Pose::Identity());
     } else if (told.X) {
       tool.X_FT = *told.X;
-      tool.file = program_.files[index_].name;
+      tool.file = told.file.empty() ? program_.files[index_].name : told.file;
+      tool.line = told.line;
     } else if (told.by_program) {
       tool.why_not = told.why;
     }
@@ -580,12 +730,15 @@ class File {
   void motion(const Pieces& statement, const Selected& selected) {
     static const std::set<std::string_view> kMotions = {"J", "L", "C", "A", "S"};
     if (statement.size() < 4 || !kMotions.contains(statement[0].text)) return;
-    if (!statement[1].is("P") && !statement[1].is("PR")) return;
+    // `L PAL_1[BTM] 100mm/sec FINE`
+    const bool elsewhere = !statement[1].is("P") && !statement[1].is("PR");
+    if (elsewhere && (statement[1].kind != Piece::Kind::kWord || !statement[2].is("["))) return;
     const bool goes_on = statement[0].is("A") && last_motion_ == "A";
     program_.moves.push_back({index_, statement[0].line, {}, statement[0].is("C") || statement[0].is("A")});
     program_.moves.back().arc_goes_on = goes_on;
     last_motion_ = std::string(statement[0].text);
     note_speed(statement);
+    if (elsewhere) return leave(statement, std::string(statement[1].text), "it is no point of /POS");
     std::string why;
     if (line_tracking_ != 0)
       why = fmt::format("LINE_TRACK (line {}): it is seen from a conveyor that moves, not from the user frame",
@@ -645,17 +798,6 @@ class File {
     if (!any) leave(statement, name, fmt::format("{} is not in /POS", name));
   }
 
-  void finish() {
-    for (const auto& known : positions_) {
-      const auto& [begin, position] = known;
-      const std::string& name = position.name;
-      const bool listed = std::any_of(program_.left.begin(), program_.left.end(),
-                                      [&](const LeftAlone& left) { return left.file == index_ && left.name == name; });
-      if (!used_.contains(begin) && !listed)
-        program_.left.push_back({position.name, index_, position.line, "", "no motion in these files goes to it"});
-    }
-  }
-
   /// Groups beyond the first, and E1 to E3 of the first.
   static void note_external(int group, const Group& values, ProgramTarget& target) {
     for (int k = 1; k <= 6; ++k) {
@@ -694,11 +836,62 @@ class File {
   std::map<std::size_t, Position> positions_;  ///< by their first byte
   std::map<std::string, std::size_t> by_name_;
   std::vector<Pieces> statements_;
-  std::string last_motion_;
+  std::string name_, last_motion_;
   bool jumps_anywhere_ = false;  ///< `JMP LBL[R[1]]`
   int line_tracking_ = 0;        ///< the line that says so; 0: none does
   std::set<std::size_t> used_;
 };
+
+/// The motions of all programs, each with what is selected before it: a program calls another.
+void read_motions(std::vector<File>& files) {
+  struct Place {
+    std::size_t file = 0, statement = 0;
+    bool is_one = false;  ///< a statement stands there
+  };
+  std::vector<Step> steps;
+  std::vector<Place> places;
+  const auto add = [&](Step step, Place place) {
+    steps.push_back(std::move(step));
+    places.push_back(place);
+  };
+  for (std::size_t f = 0; f < files.size(); ++f) {
+    add({Step::Kind::kRoutine, files[f].name()}, {});
+    int open = 0;  // an ENDIF without its IF ends no program
+    for (std::size_t s = 0; s < files[f].statements(); ++s) {
+      bool first = true;
+      for (Step& step : files[f].steps_of(s)) {
+        if (step.kind == Step::Kind::kIf || step.kind == Step::Kind::kWhile) ++open;
+        if (step.kind == Step::Kind::kEnd && open-- == 0) {
+          open = 0;
+          step.kind = Step::Kind::kPlain;
+        }
+        add(std::move(step), first ? Place{f, s, true} : Place{});
+        first = false;
+      }
+    }
+    for (; open >= 0; --open) add({Step::Kind::kEnd}, {});
+  }
+  const std::vector<Selected> selected = states_before(
+      flow_of(steps), Selected{},
+      [&](std::size_t step, Selected& state) {
+        if (places[step].is_one) files[places[step].file].select(places[step].statement, state);
+      },
+      File::join);
+  for (std::size_t step = 0; step < steps.size(); ++step) {
+    if (places[step].is_one) files[places[step].file].motion(places[step].statement, selected[step]);
+  }
+  for (File& file : files) file.finish();
+}
+
+/// What was taken from the system variables, a sentence a file.
+std::vector<std::string> notes_on_system(const Controller& controller) {
+  std::map<std::string, std::vector<std::string>> by_file;
+  for (const auto& [name, file] : controller.taken) by_file[file].push_back(name);
+  std::vector<std::string> notes;
+  for (const auto& [file, names] : by_file)
+    notes.push_back(fmt::format("{}: taken from {}", fmt::join(names, ", "), file));
+  return notes;
+}
 
 }  // namespace
 
@@ -708,11 +901,13 @@ Program read_fanuc(std::vector<SourceFile> files, const ReadOptions& options) {
   program.files = std::move(files);
   Sites sites;
   Controller controller;
+  controller.system = fanuc::system_frames(options.beside);
   std::vector<File> read;
   read.reserve(program.files.size());
   for (std::size_t f = 0; f < program.files.size(); ++f)
     read.emplace_back(f, program, sites, controller, options).read();
-  for (File& file : read) file.read_motions();
+  read_motions(read);
+  for (std::string& note : notes_on_system(controller)) program.notes.push_back(std::move(note));
   for (const auto& [load, set] : controller.loads)
     program.notes.push_back(
         fmt::format("{} ({}{}): the controller alone knows this load, it is not compared with the cell's", load,

@@ -30,6 +30,13 @@ struct Statement {
   int line = 1;
 };
 
+/// What moves the robot beside where motions say.
+struct Displaced {
+  int shifted_at = 0;  ///< the line of a SFTON that holds; 0: none does
+  std::string sensed;  ///< what a sensor or a soft axis does, as `COMARCON (line 7)`; empty: nothing
+  bool operator==(const Displaced&) const = default;
+};
+
 class Job {
  public:
   Job(std::size_t index, Program& program, Sites& sites, const ReadOptions& options)
@@ -114,12 +121,17 @@ class Job {
     return {word == kWords.end() ? Step{} : Step{word->second}};
   }
 
-  /// `SFTON`, `SFTOF`: the line that displaces what follows; 0: none.
-  void shift(const Statement& statement, int& shifted_at) const {
+  /// `SFTON`, `SFTOF`; `COMARCON`, `COMARCOF` of the seam's sensor, and their like.
+  void shift(const Statement& statement, Displaced& displaced) const {
+    static const std::map<std::string_view, bool> kSensors = {{"COMARCON", true}, {"COMARCOF", false},
+                                                              {"FLOATON", true},  {"FLOATOF", false},
+                                                              {"PMTON", true},    {"PMTOF", false}};
     const std::vector<Piece> pieces = pieces_at(statement);
     if (pieces.empty()) return;
-    if (pieces[0].is("SFTON")) shifted_at = statement.line;
-    if (pieces[0].is("SFTOF")) shifted_at = 0;
+    if (pieces[0].is("SFTON")) displaced.shifted_at = statement.line;
+    if (pieces[0].is("SFTOF")) displaced.shifted_at = 0;
+    if (const auto sensor = kSensors.find(pieces[0].text); sensor != kSensors.end())
+      displaced.sensed = sensor->second ? fmt::format("{} (line {})", sensor->first, statement.line) : "";
   }
 
   void list_unused() {
@@ -134,16 +146,20 @@ class Job {
     target.line = position.line;
     if (position.again_at != 0)
       return fmt::format("it stands there twice (line {}, line {})", position.line, position.again_at);
-    if (position.kind == "PULSE") return "it is in pulses, which need the robot's gear data";
+    const bool in_pulses = position.kind == "PULSE";
+    if (in_pulses && options_.keep_joints) return "joint targets are kept (--keep-joints)";
+    if (in_pulses && options_.pulses_per_deg.empty())
+      return "it is in pulses, and only the controller knows how many make a degree: --pulses-per-deg tells it";
     if (position.numbers.size() < 6) return fmt::format("it has {} numbers, 6 are due", position.numbers.size());
-    target.coordinates = Coordinates::kAnglesXyz;
+    target.coordinates = in_pulses ? Coordinates::kJointPulses : Coordinates::kAnglesXyz;
+    if (in_pulses) target.pulses_per_deg = options_.pulses_per_deg;
     for (std::size_t k = 0; k < 6; ++k) {
       const auto written = read_number(position.numbers[k].text);
       if (!written) return "it holds what is no number";
       target.numbers.push_back(written->value);
       target.rewrites.push_back({{position.numbers[k].begin, position.numbers[k].end}, {}, {{k, written->style}}});
     }
-    target.configuration = configuration_of(position.conf);
+    if (!in_pulses) target.configuration = configuration_of(position.conf);
     return take_external(site, target);
   }
 
@@ -239,7 +255,7 @@ class Job {
       frame.name = fmt::format("USER[{}]", position.user);
       frame.why_not = why_set(frame.name, "USER[*]");
       if (frame.why_not.empty()) frame.why_not = why_set(frame_of_call(name_), "");
-      if (!frame.why_not.empty()) return known_frame(std::move(frame));
+      if (!frame.why_not.empty()) return add_once(program_, std::move(frame));
       if (!take_row(frame.name, options_, frame))
         frame.why_not = fmt::format("{} is not in the job: --frames tells its value", shown(frame.name));
     } else if (position.kind == "ROBOT") {
@@ -247,15 +263,7 @@ class Job {
     } else if (position.kind != "BASE" && position.kind != "PULSE") {
       frame.why_not = fmt::format("frame {} is not known", shown(position.kind));
     }
-    return known_frame(std::move(frame));
-  }
-
-  std::size_t known_frame(ProgramFrame frame) {
-    for (std::size_t k = 0; k < program_.frames.size(); ++k) {
-      if (program_.frames[k].name == frame.name && program_.frames[k].why_not == frame.why_not) return k;
-    }
-    program_.frames.push_back(std::move(frame));
-    return program_.frames.size() - 1;
+    return add_once(program_, std::move(frame));
   }
 
   /// Why a frame or tool is not what it was; empty: no job sets it.
@@ -275,8 +283,7 @@ class Job {
   }
 
  public:
-  /// `shifted_at`: the line of a SFTON that holds; 0: none does.
-  void motion(const Statement& statement, int shifted_at) {
+  void motion(const Statement& statement, const Displaced& displaced) {
     const std::vector<Piece> pieces = pieces_at(statement);
     const int number = statement.line;
     if (pieces.empty()) return;
@@ -302,7 +309,8 @@ class Job {
     if (group_.starts_with("RB") && group_.substr(0, group_.find(',')) != "RB1")
       return leave(fmt::format("the job moves {}, another robot", shown(group_.substr(0, group_.find(',')))));
     if (word == "IMOV") return leave("it is relative to where the robot is");
-    if (shifted_at != 0) return leave(fmt::format("SFTON displaces it (line {})", shifted_at));
+    if (displaced.shifted_at != 0) return leave(fmt::format("SFTON displaces it (line {})", displaced.shifted_at));
+    if (!displaced.sensed.empty()) return leave(fmt::format("a sensor or a soft axis moves it: {}", displaced.sensed));
     const auto position = positions_.find(name);
     if (position == positions_.end()) return leave("it is a variable, which any job may set");
     if (name[0] != 'C') return leave("it moves external axes alone");
@@ -399,12 +407,15 @@ void read_motions(std::vector<Job>& jobs) {
     }
     add({Step::Kind::kEnd}, {});
   }
-  const std::vector<int> shifted = states_before(
-      flow_of(steps), 0,
-      [&](std::size_t s, int& at) {
-        if (places[s].statement != nullptr) jobs[places[s].job].shift(*places[s].statement, at);
+  const std::vector<Displaced> shifted = states_before(
+      flow_of(steps), Displaced{},
+      [&](std::size_t s, Displaced& displaced) {
+        if (places[s].statement != nullptr) jobs[places[s].job].shift(*places[s].statement, displaced);
       },
-      [](int& at, const int& other, const std::string&) { at = std::max(at, other); });
+      [](Displaced& one, const Displaced& other, const std::string&) {
+        one.shifted_at = std::max(one.shifted_at, other.shifted_at);
+        if (one.sensed.empty()) one.sensed = other.sensed;
+      });
   for (std::size_t s = 0; s < steps.size(); ++s) {
     if (places[s].statement != nullptr) jobs[places[s].job].motion(*places[s].statement, shifted[s]);
   }

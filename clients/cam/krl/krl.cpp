@@ -59,6 +59,7 @@ struct State {
   std::size_t tool = 0, frame = 0;
   std::size_t load = 0;          ///< 0: the tool's own
   std::string fixed_tool;        ///< why the robot does not hold the tool; empty: it does
+  std::string sensed;            ///< why a sensor moves the path; empty: none does
   std::uint64_t armed = 0;       ///< interrupts that are declared, a bit each
   double speed = kSpeedUnknown;  ///< of the tool, mm/s
   auto operator<=>(const State&) const = default;
@@ -115,6 +116,7 @@ class Reader {
     find_order();
     list_unused();
     note_elsewhere();
+    note_angles();
     return std::move(program_);
   }
 
@@ -671,6 +673,7 @@ class Reader {
     if (state.load != other.load && loads_[state.load].why_not.empty())
       state.load = add_load({"$LOAD", std::nullopt, "", "$LOAD: " + why});
     if (state.fixed_tool != other.fixed_tool && state.fixed_tool.empty()) state.fixed_tool = why;
+    if (state.sensed.empty()) state.sensed = other.sensed;
     state.armed |= other.armed;
     state.speed = std::max(state.speed, other.speed);
   }
@@ -682,6 +685,7 @@ class Reader {
     const std::string& word = tokens[0].text;
     const bool assigns = tokens.size() > 2 && tokens[1].text == "=";
     std::size_t end = 0;
+    set_sensor(tokens, f, k, state);
     sets_by_hand_ |= word == "$TOOL" || word == "$BASE";
     if (word == "$TOOL" && assigns) {
       state.tool = tool_set(krl::operands_at(tokens, 2, &end), f, k);
@@ -715,6 +719,18 @@ class Reader {
     }
     if (depth >= kDeepest) return;
     for (const std::size_t called : called_by(tokens)) state = end_of(called, state, depth + 1);
+  }
+
+  /// `ret=RSI_ON(#RELATIVE)`, `RSI_OFF()`; `ST_ON1( )` of older ones.
+  void set_sensor(const std::vector<Token>& tokens, std::size_t f, std::size_t k, State& state) const {
+    static const std::set<std::string> kBegins = {"RSI_ON", "ST_ON", "ST_ON1"},
+                                       kEnds = {"RSI_OFF", "ST_OFF", "ST_OFF1"};
+    for (std::size_t at = 0; at + 1 < tokens.size(); ++at) {
+      if (tokens[at + 1].text != "(" || declares(tokens)) continue;
+      if (kBegins.contains(tokens[at].text))
+        state.sensed = fmt::format("a sensor corrects the path ({}, {})", tokens[at].text, names_.place(f, k));
+      if (kEnds.contains(tokens[at].text)) state.sensed.clear();
+    }
   }
 
   /// `$VEL.CP=0.25`, `$VEL={CP 0.25,...}`, `$VEL=SVEL_CP(0.25, , LCPDAT1)`, m/s.
@@ -851,6 +867,18 @@ class Reader {
       if (next >= tokens.size() || tokens[next].text != ",") break;
       ++next;
     }
+    if (count == 2 && next < tokens.size() && tokens[next].text == "CA") by_angle_.insert({f, lines_[f][k].number});
+  }
+
+  /// `CIRC XP1,XP2,CA 360`: the circle through the points is corrected, and the arc ends elsewhere on it.
+  void note_angles() {
+    if (by_angle_.empty()) return;
+    const auto& [f, line] = *by_angle_.begin();
+    const std::string more = by_angle_.size() > 1 ? fmt::format(" and {} more", by_angle_.size() - 1) : "";
+    program_.notes.push_back(fmt::format(
+        "an arc ends by its angle CA and not at its end point ({} line {}{}): the circle through its points "
+        "is corrected, and what lies beyond them follows it",
+        program_.files[f].name, line, more));
   }
 
   std::string text_of(std::size_t f, const std::vector<Token>& tokens, std::size_t from) const {
@@ -862,6 +890,7 @@ class Reader {
     const std::string name =
         program_.files[f].text.substr(operands.front().begin, operands.back().end - operands.front().begin);
     if (!state.fixed_tool.empty()) return leave(f, k, name, state.fixed_tool);
+    if (!state.sensed.empty()) return leave(f, k, name, state.sensed);
     const SiteUse use{state.tool,
                       state.frame,
                       lines_[f][k].tokens[0].text,
@@ -1158,6 +1187,7 @@ class Reader {
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> moves_;
   std::map<std::pair<std::size_t, std::size_t>, Assigned> places_;
   std::set<std::tuple<std::size_t, int, std::string>> left_;
+  std::set<std::pair<std::size_t, int>> by_angle_;   ///< arcs, by file and line
   std::map<std::size_t, std::vector<double>> axes_;  ///< deg, that motions command
   Sites sites_;
 };

@@ -52,6 +52,20 @@ bool only_reads(const std::string& name) {
   return false;
 }
 
+constexpr const char* kFindsLoads = "loadid";
+
+/// Which argument of an instruction is the tool that it measures: `MToolTCPCalib jos1,jos2,jos3,jos4,tGun,max,mean;`.
+std::size_t tool_found_by(const std::string& instruction) {
+  static const std::map<std::string, std::size_t> kFound = {
+      {"mtooltcpcalib", 4}, {"stooltcpcalib", 4}, {"mtoolrotcalib", 2}, {"stoolrotcalib", 3}, {kFindsLoads, 2}};
+  const auto found = kFound.find(instruction);
+  return found == kFound.end() ? std::string::npos : found->second;
+}
+
+bool sets_by_name(const std::string& instruction) {
+  return instruction == "setdataval" || instruction == "setalldataval";
+}
+
 bool is_literal(const Expression& expression) {
   switch (expression.kind) {
     case Kind::kNumber:
@@ -94,8 +108,10 @@ bool is_still(const std::string& instruction) {
   return kReaders.contains(instruction);
 }
 
-Interpreter::Interpreter(const std::vector<SourceFile>& files, const std::vector<Module>& modules)
-    : files_(files), modules_(modules), by_name_(modules.size()) {
+Interpreter::Interpreter(const std::vector<SourceFile>& files, const std::vector<Module>& modules,
+                         std::map<std::string, std::string> set_elsewhere)
+    : files_(files), modules_(modules), by_name_(modules.size()), set_elsewhere_(std::move(set_elsewhere)) {
+  for (const SourceFile& file : files_) tasks_.push_back(task_of(file.name));
   for (std::size_t m = 0; m < modules_.size(); ++m) {
     static_cast<void>(own_scope(m, -1));
     for (std::size_t r = 0; r < modules_[m].routines.size(); ++r)
@@ -103,7 +119,7 @@ Interpreter::Interpreter(const std::vector<SourceFile>& files, const std::vector
     for (const Declaration& declared : modules_[m].declarations) {
       const auto [known, fresh] = by_name_[m].emplace(std::pair(declared.routine, declared.name), &declared);
       if (!fresh && declared.storage != Storage::kLoop) note_twice(m, *known->second, declared);
-      if (declared.routine < 0 && !declared.local) global_.emplace(declared.name, Found{&declared, m});
+      if (declared.routine < 0 && !declared.local) global_[declared.name].push_back({&declared, m});
     }
   }
   note_changes();
@@ -139,21 +155,31 @@ std::optional<Interpreter::Found> Interpreter::find(const std::string& name, con
     if (const auto it = own.find({scope.routine, name}); it != own.end()) return Found{it->second, scope.module};
   }
   if (const auto it = own.find({-1, name}); it != own.end()) return Found{it->second, scope.module};
-  if (const auto it = global_.find(name); it != global_.end()) return it->second;
-  return std::nullopt;
+  return find_global(name, scope.module);
+}
+
+std::optional<Interpreter::Found> Interpreter::find_global(const std::string& name, std::size_t module) const {
+  const auto known = global_.find(name);
+  if (known == global_.end()) return std::nullopt;
+  const auto own = std::find_if(known->second.begin(), known->second.end(),
+                                [&](const Found& found) { return tasks_[found.module] == tasks_[module]; });
+  return own == known->second.end() ? known->second.front() : *own;
 }
 
 std::optional<std::pair<std::size_t, int>> Interpreter::find_routine(const std::string& name,
                                                                      std::size_t module) const {
   const auto known = routines_.find(name);
   if (known == routines_.end()) return std::nullopt;
+  std::optional<std::pair<std::size_t, int>> of_another_task;
   for (const bool own : {true, false}) {
     for (const auto& [m, r] : known->second) {
       const bool is_local = modules_[m].routines[static_cast<std::size_t>(r)].local;
-      if ((m == module) == own && (own || !is_local)) return std::pair(m, r);
+      if ((m == module) != own || (!own && is_local)) continue;
+      if (tasks_[m] == tasks_[module]) return std::pair(m, r);
+      if (!of_another_task) of_another_task = std::pair(m, r);
     }
   }
-  return std::nullopt;
+  return of_another_task;
 }
 
 const Scope* Interpreter::own_scope(std::size_t module, int routine) {
@@ -239,11 +265,13 @@ void Interpreter::note_changes_by_tasks() {
   };
   std::map<std::string, Shared> by_name;
   for (std::size_t m = 0; m < modules_.size(); ++m) {
-    const std::string task = task_of(files_[m].name);
     for (const Declaration& declared : modules_[m].declarations) {
-      if (task.empty() || declared.storage != Storage::kPers || declared.routine >= 0 || declared.local) continue;
+      if (!is_shared(declared)) continue;
+      if (const auto elsewhere = set_elsewhere_.find(declared.name); elsewhere != set_elsewhere_.end())
+        changed_.emplace(&declared, elsewhere->second);
+      if (tasks_[m].empty()) continue;
       Shared& shared = by_name[declared.name];
-      shared.tasks.insert(task);
+      shared.tasks.insert(tasks_[m]);
       shared.declared.push_back(&declared);
       for (const auto* changes : {&changed_, &set_in_order_}) {
         if (const auto change = changes->find(&declared); change != changes->end()) shared.why = change->second;
@@ -253,6 +281,49 @@ void Interpreter::note_changes_by_tasks() {
   for (const auto& [name, shared] : by_name) {
     if (shared.tasks.size() < 2 || shared.why.empty()) continue;
     for (const Declaration* declared : shared.declared) changed_.emplace(declared, shared.why);
+  }
+}
+
+bool Interpreter::is_shared(const Declaration& declared) {
+  return declared.storage == Storage::kPers && declared.routine < 0 && !declared.local && !declared.of_task;
+}
+
+std::map<std::string, std::string> Interpreter::set_for_all_tasks() const {
+  std::map<std::string, std::string> set;
+  for (const auto* changes : {&changed_, &set_in_order_}) {
+    for (const auto& [declared, why] : *changes) {
+      if (is_shared(*declared)) set.emplace(declared->name, why);
+    }
+  }
+  return set;
+}
+
+std::string Interpreter::load_found(const Declaration* tool) const {
+  const auto found = load_found_.find(tool);
+  return found == load_found_.end() ? "" : found->second;
+}
+
+/// `SetDataVal "p10",pNew;`: the name is a text, so that any data of the type may be meant. `SetAllDataVal` sets all.
+void Interpreter::note_changes_by_name(std::size_t module, const Instruction& instruction) {
+  std::vector<const Expression*> positional;
+  for (const Expression& argument : instruction.arguments) {
+    if (argument.label.empty()) positional.push_back(&argument);
+  }
+  if (positional.size() < 2) return;
+  const Scope& scope = *own_scope(module, instruction.routine);
+  const std::string why = fmt::format("{} may set it ({})", instruction.spelled, place_of(module, instruction.line));
+  const std::string text = positional[0]->kind == Kind::kText ? text_of(*positional[0], scope) : "";
+  if (instruction.name == "setdataval" && text.size() > 2) {
+    const auto found = find(in_lower_case(text.substr(1, text.size() - 2)), scope);
+    if (found && found->declaration->storage != Storage::kConst) changed_.emplace(found->declaration, why);
+    return;
+  }
+  const std::string type = type_of(*positional[1], scope);
+  for (const Module& any : modules_) {
+    for (const Declaration& declared : any.declarations) {
+      const bool may_be_set = declared.storage == Storage::kPers || declared.storage == Storage::kVar;
+      if (may_be_set && (type.empty() || declared.type == type)) changed_.emplace(&declared, why);
+    }
   }
 }
 
@@ -325,6 +396,7 @@ void Interpreter::note_changes_by(std::size_t module, const Instruction& instruc
   const Scope& scope = *own_scope(module, instruction.routine);
   const auto routine = find_routine(instruction.name, module);
   if (!routine && only_reads(instruction.name)) return;
+  if (!routine && sets_by_name(instruction.name)) return note_changes_by_name(module, instruction);
   std::size_t position = 0;
   for (const Expression& argument : instruction.arguments) {
     const std::size_t at = argument.label.empty() ? position++ : position;
@@ -348,8 +420,14 @@ void Interpreter::note_changes_by(std::size_t module, const Instruction& instruc
     const bool is_found_point = instruction.name.starts_with("search") && at == 1 && argument.label.empty();
     if (instruction.name.starts_with("search") && !is_found_point) continue;
     const std::string type = type_of(argument, scope);
-    // Tools and work objects are handed to all kinds of instructions; they are changed by assignment.
-    if (type == "tooldata" || type == "wobjdata") continue;
+    // Tools and work objects are handed to all kinds of instructions; they are changed by assignment, and by few.
+    const bool is_found = argument.label.empty() && at == tool_found_by(instruction.name);
+    if (is_found && instruction.name == kFindsLoads) {
+      if (const auto found = find(root->name, scope))
+        load_found_.emplace(found->declaration, place_of(module, instruction.line));
+      continue;
+    }
+    if ((type == "tooldata" || type == "wobjdata") && !is_found) continue;
     change();
   }
 }

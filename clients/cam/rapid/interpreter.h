@@ -64,7 +64,9 @@ constexpr double kNoAxis = 8.9e9;  ///< an external axis that is at 9E9 is not t
 
 class Interpreter {
  public:
-  Interpreter(const std::vector<SourceFile>& files, const std::vector<Module>& modules);
+  /// `set_elsewhere`: persistents that tasks which are not read set, in lower case, with where.
+  Interpreter(const std::vector<SourceFile>& files, const std::vector<Module>& modules,
+              std::map<std::string, std::string> set_elsewhere = {});
 
   struct Found {
     const Declaration* declaration = nullptr;
@@ -80,6 +82,10 @@ class Interpreter {
 
   /// Why a declared value may be another one at run time; empty: it is never changed.
   [[nodiscard]] std::string changed(const Declaration* declaration) const;
+  /// The persistents that these modules set and that other tasks may have too, in lower case, with where.
+  [[nodiscard]] std::map<std::string, std::string> set_for_all_tasks() const;
+  /// Where a tool's load is found at run time (LoadId); empty: nowhere.
+  [[nodiscard]] std::string load_found(const Declaration* tool) const;
 
   /// Whether an assignment gives a tool or work object a constant, which holds until the next one.
   [[nodiscard]] bool sets(const Assignment& assignment) const { return parts_.contains(&assignment); }
@@ -107,6 +113,10 @@ class Interpreter {
  private:
   void note_changes();
   void note_changes_by_tasks();
+  void note_changes_by_name(std::size_t module, const Instruction& instruction);
+  /// Of one task, where there are several.
+  [[nodiscard]] std::optional<Found> find_global(const std::string& name, std::size_t module) const;
+  [[nodiscard]] static bool is_shared(const Declaration& declared);
   void note_twice(std::size_t module, const Declaration& one, const Declaration& other);
   void note_change(const Expression& target, const Scope& scope, const std::string& why);
   /// The part of a tool or work object of the same module that a constant is assigned to.
@@ -134,7 +144,10 @@ class Interpreter {
   const std::vector<SourceFile>& files_;
   const std::vector<Module>& modules_;
   std::vector<std::map<std::pair<int, std::string>, const Declaration*>> by_name_;
-  std::map<std::string, Found> global_;
+  std::vector<std::string> tasks_;                    ///< of the modules
+  std::map<std::string, std::vector<Found>> global_;  ///< by name, in the order of the modules
+  std::map<std::string, std::string> set_elsewhere_;
+  std::map<const Declaration*, std::string> load_found_;
   std::unordered_map<std::string, std::vector<std::pair<std::size_t, int>>> routines_;  ///< by name, in their order
   std::map<const Declaration*, std::string> changed_;
   std::map<const Declaration*, std::string> set_in_order_;  ///< where, of those that constants alone are assigned to

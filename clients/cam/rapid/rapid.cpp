@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 #include <tuple>
@@ -59,6 +60,25 @@ bool is_motion(const std::string& name) {
 /// Whether the tool goes to the target on a line or an arc.
 bool is_linear(const std::string& name) { return name.find('j') == std::string::npos; }
 
+/// The label of a routine that is named at run time.
+constexpr const char* kAnyRoutine = "any";
+
+/// From an instruction to another one the arm does not go where motions say.
+struct GiveWay {
+  const char *begins, *label;  ///< empty label: with any
+  const char* ends;            ///< as names of instructions begin
+  const char* why;
+};
+const std::array<GiveWay, 4>& give_ways() {
+  static const std::array<GiveWay, 4> kAll = {
+      {{"singarea", "lockaxis4", "singarea",
+        "SingArea\\LockAxis4 holds axis 4, so that the orientation is not reached"},
+       {"fcact", "", "fcdeact", "FCAct: a force decides where the tool goes"},
+       {"softact", "", "softdeact", "SoftAct: a soft axis gives way, and the model knows stiff ones"},
+       {"cssact", "", "cssdeact", "CSSAct: the arm gives way, and the model knows a stiff one"}}};
+  return kAll;
+}
+
 /// A motion goes to this place with this tool in this frame.
 struct Use {
   std::size_t tool = 0, frame = 0;
@@ -90,7 +110,7 @@ class Reader {
         program_.cuts.push_back({modules_.size() - 1, found.line, found.what});
       program_.mark_places.push_back(mark_place(file.text, modules_.back().head_end));
     }
-    meaning_.emplace(program_.files, modules_);
+    meaning_.emplace(program_.files, modules_, set_by(options.beside));
     tools_.emplace(*meaning_, options_, program_);
   }
 
@@ -125,6 +145,14 @@ class Reader {
   }
 
  private:
+  /// What other tasks of the controller set.
+  static std::map<std::string, std::string> set_by(const std::vector<SourceFile>& beside) {
+    if (beside.empty()) return {};
+    std::vector<Module> modules;
+    for (const SourceFile& file : beside) modules.push_back(parse(file.text));
+    return Interpreter(beside, modules).set_for_all_tasks();
+  }
+
   /// Below the head of the module, else at the top.
   static MarkPlace mark_place(const std::string& text, std::size_t head_end) {
     const std::size_t end = head_end == 0 ? std::string::npos : text.find('\n', head_end);
@@ -213,7 +241,45 @@ class Reader {
       }
       add_turns(instructions.size());
     }
+    for (Step& step : late_routines()) add(std::move(step), {});
     return all;
+  }
+
+  /// What a call may mean whose routine is named at run time: a routine that nothing calls by its name.
+  std::vector<Step> late_routines() const {
+    std::set<std::pair<std::size_t, int>> by_name;  // and those that call so: one that calls itself has no beginning
+    bool any = false;
+    for (std::size_t m = 0; m < modules_.size(); ++m) {
+      for (const Instruction& instruction : modules_[m].instructions) {
+        if (const auto routine = meaning_->find_routine(instruction.name, m)) by_name.insert(*routine);
+        if (!is_late(instruction) || meaning_->find_routine(named_late(m, instruction), m)) continue;
+        by_name.emplace(m, instruction.routine);
+        any = true;
+      }
+    }
+    if (!any) return {};
+    std::vector<Step> steps = {{Step::Kind::kRoutine, kAnyRoutine}, {Step::Kind::kSwitch}};
+    for (std::size_t m = 0; m < modules_.size(); ++m) {
+      for (std::size_t r = 0; r < modules_[m].routines.size(); ++r) {
+        const Routine& routine = modules_[m].routines[r];
+        if (routine.is_function || routine.name == "main" || by_name.contains({m, static_cast<int>(r)})) continue;
+        steps.push_back({Step::Kind::kCase});
+        steps.push_back({Step::Kind::kCall, fmt::format("{}:{}", m, r)});
+      }
+    }
+    steps.push_back({Step::Kind::kEnd});
+    steps.push_back({Step::Kind::kEnd});
+    return steps;
+  }
+  static bool is_late(const Instruction& instruction) {
+    return (instruction.name == kLateCall || instruction.name == "callbyvar") && !instruction.arguments.empty();
+  }
+  /// The name that a late call spells out; empty: it is not known.
+  std::string named_late(std::size_t module, const Instruction& instruction) const {
+    const Expression& name = instruction.arguments[0];
+    if (instruction.name != kLateCall || name.kind != Kind::kText) return "";
+    const std::string& text = program_.files[module].text;
+    return in_lower_case(text.substr(name.begin + 1, name.end - std::min(name.end, name.begin + 2)));
   }
 
   Step step_of(std::size_t module, const Instruction& instruction) const {
@@ -225,7 +291,9 @@ class Reader {
     if (kReturns.contains(instruction.name)) return {Step::Kind::kReturn};
     if (instruction.name == "goto" && !instruction.arguments.empty())
       return {Step::Kind::kJump, instruction.arguments[0].name};
-    const auto routine = meaning_->find_routine(instruction.name, module);
+    const bool late = is_late(instruction);
+    const auto routine = meaning_->find_routine(late ? named_late(module, instruction) : instruction.name, module);
+    if (late && !routine) return {Step::Kind::kCall, kAnyRoutine};
     if (!routine) return {};
     return {Step::Kind::kCall, fmt::format("{}:{}", routine->first, routine->second)};
   }
@@ -238,6 +306,7 @@ class Reader {
     std::size_t load = 0;                         ///< as tools_ numbers them; 0: the tool's own
     std::size_t displaced = 0;                    ///< of displacements_; 0: none
     std::size_t external_displaced = 0;           ///< the same
+    std::array<std::size_t, 4> given_way{};       ///< the same, of give_ways()
     std::size_t settings = 0;                     ///< of settings_
     Confs lines = Confs::kOn, axes = Confs::kOn;  ///< ConfL, ConfJ
     bool operator==(const State&) const = default;
@@ -254,6 +323,13 @@ class Reader {
     if (instruction.name == "gripload") state.load = tools_->load_set(place.module, instruction);
     if (instruction.name == "pdispoff") state.displaced = 0;
     if (instruction.name == "eoffsoff") state.external_displaced = 0;
+    for (std::size_t k = 0; k < state.given_way.size(); ++k) {
+      const GiveWay& way = give_ways()[k];
+      if (instruction.name.starts_with(way.ends)) state.given_way[k] = 0;
+      if (instruction.name != way.begins || (*way.label != '\0' && !has_label(instruction, way.label))) continue;
+      state.given_way[k] =
+          known_displacement(fmt::format("{} ({})", way.why, meaning_->place_of(place.module, instruction.line)));
+    }
     if (instruction.name == "confl") state.lines = confs_of(instruction);
     if (instruction.name == "confj") state.axes = confs_of(instruction);
     if (displaces(instruction)) state.displaced = known_displacement(displacement(place.module, instruction));
@@ -291,6 +367,8 @@ class Reader {
   void join(State& state, const State& other, const std::string& by) {
     state.displaced = std::max(state.displaced, other.displaced);
     state.external_displaced = std::max(state.external_displaced, other.external_displaced);
+    for (std::size_t k = 0; k < state.given_way.size(); ++k)
+      state.given_way[k] = std::max(state.given_way[k], other.given_way[k]);
     if (state.settings != other.settings)
       state.settings = known_settings(on_both_ways(*settings_[state.settings], *settings_[other.settings]));
     if (state.lines != other.lines) state.lines = Confs::kUndecided;
@@ -363,6 +441,10 @@ class Reader {
     };
     if (is_search(motion.name)) return leave(module, motion, "", "a sensor decides where the motion ends");
     if (has_label(motion, "corr")) return leave_it("a sensor corrects the path (\\Corr)");
+    if (has_label(motion, "track")) return leave_it("a sensor corrects the path (\\Track)");
+    for (const std::size_t way : state_.given_way) {
+      if (way != 0) return leave_it(displacements_[way]);
+    }
     if (state_.displaced != 0) return leave_it(displacements_[state_.displaced]);
     if (!open_displacement_.empty()) return leave_it(open_displacement_);
     for (const Scope* scope : meaning_->scopes_of(module, motion.routine)) {

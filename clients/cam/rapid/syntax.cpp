@@ -185,8 +185,22 @@ class Parser {
     module_.conditions.push_back({tokens_[begin].begin, token().begin, routine_, tokens_[begin].line});
   }
 
-  /// `%%%` heads of module files, `%"name"%;`, or rubbish.
-  void skip_odd_statement() { ++at_; }
+  /// `%"name"% p10;`. Heads of module files, `%%%`, and rubbish mean nothing.
+  void skip_odd_statement() {
+    const bool of_head = is_sign("%", 1) ||
+                         (at_ > 0 && tokens_[at_ - 1].kind == TokenKind::kSign && text_[tokens_[at_ - 1].begin] == '%');
+    if (!is_sign(kLateCall) || of_head || routine_ < 0) {
+      ++at_;
+      return;
+    }
+    Instruction made = instruction_here();
+    made.name = kLateCall;
+    ++at_;
+    made.arguments.push_back(expression());
+    while (!at_statement_end() && !is_sign("%")) ++at_;
+    take("%");
+    arguments(std::move(made));
+  }
 
   void module_head() {
     drop_blocks_down_to(0);
@@ -227,7 +241,10 @@ class Parser {
     declared.begin = token().begin;
     declared.line = token().line;
     declared.routine = routine_;
-    if (word() == "local" || word() == "task") declared.local = take_word() == "local";
+    if (word() == "local" || word() == "task") {
+      declared.local = word() == "local";
+      declared.of_task = take_word() == "task";
+    }
     const std::string kind = take_word();
     if (kind == "proc" || kind == "func" || kind == "trap") return routine_head(kind, declared.local);
     if (kind != "const" && kind != "pers" && kind != "var") return skip_statement();
@@ -380,13 +397,23 @@ class Parser {
     instruction();
   }
 
-  void instruction() {
+  [[nodiscard]] Instruction instruction_here() const {
     Instruction made;
     made.begin = token().begin;
     made.line = token().line;
     made.routine = routine_;
     made.spelled = std::string(bytes());
+    return made;
+  }
+
+  void instruction() {
+    Instruction made = instruction_here();
     made.name = take_word();
+    arguments(std::move(made));
+  }
+
+  /// Up to the end of the instruction.
+  void arguments(Instruction made) {
     while (!at_statement_end()) {
       if (take(",")) continue;
       Expression argument;

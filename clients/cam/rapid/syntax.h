@@ -71,8 +71,9 @@ struct Declaration {
   std::string name, type;
   std::string spelled = {};  ///< the name as it stands there
   Storage storage = Storage::kVar;
-  bool local = false;  ///< to its module
-  int routine = -1;    ///< of the module; -1: of the module itself
+  bool local = false;    ///< to its module
+  bool of_task = false;  ///< `TASK PERS`: each task has its own
+  int routine = -1;      ///< of the module; -1: of the module itself
   bool is_array = false;
   bool may_be_changed = false;     ///< of a parameter: INOUT, VAR, PERS
   std::size_t begin = 0, end = 0;  ///< of the statement
@@ -101,6 +102,9 @@ struct Turn {
   Step step;
   std::size_t before = 0;  ///< which instruction of the module
 };
+
+/// The name of an instruction whose routine is named at run time, by its first argument: `%"load"% p10;`.
+constexpr const char* kLateCall = "%";
 
 /// `MoveL p10,v100,fine,tool1\WObj:=wobj1;`, or a call of a procedure.
 struct Instruction {

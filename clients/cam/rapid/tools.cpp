@@ -82,16 +82,6 @@ std::size_t Tools::known_tool(ProgramTool tool) {
   return program_.tools.size() - 1;
 }
 
-std::size_t Tools::known_frame(ProgramFrame frame) {
-  for (std::size_t k = 0; k < program_.frames.size(); ++k) {
-    if (in_lower_case(program_.frames[k].name) == in_lower_case(frame.name) &&
-        program_.frames[k].X_BO.isApprox(frame.X_BO, 1e-12) && program_.frames[k].why_not == frame.why_not)
-      return k;
-  }
-  program_.frames.push_back(std::move(frame));
-  return program_.frames.size() - 1;
-}
-
 /// The aggregate of `parts` parts that a part of a tool or work object is or stands for.
 Told<Data> Tools::aggregate(const Data& of, std::size_t parts) const {
   Data now = of;
@@ -177,6 +167,13 @@ void Tools::read_tool(const Data& data, ProgramTool& tool) const {
   tool.rotation_rounding = 2 * std::pow(10.0, -decimals);
   if (!*held) tool.why_not = fmt::format("tool {} is not held by the robot", shown(tool.name));
   tool.load = load_of(part(*parts, 2));
+  if (const std::string found = meaning_.load_found(data.declared); !found.empty()) {
+    tool.load.reset();
+    tool.load_note = fmt::format(
+        "the load of tool {} is found at run time (LoadId, {}): it is not compared with the "
+        "cell's",
+        shown(tool.name), found);
+  }
 }
 
 std::optional<StatedLoad> Tools::load_of(const Data& data) const {
@@ -197,7 +194,7 @@ std::size_t Tools::frame_of(const Expression* argument, const Scope& scope) {
   const auto handed = meaning_.handed_over(*argument, scope);
   if (!handed) {
     frame.why_not = handed.error();
-    return known_frame(std::move(frame));
+    return add_once(program_, std::move(frame));
   }
   const auto& [expression, where] = *handed;
   frame.name = meaning_.text_of(*expression, *where);
@@ -206,7 +203,7 @@ std::size_t Tools::frame_of(const Expression* argument, const Scope& scope) {
     if (!take_row(frame.name, options_, frame))
       frame.why_not =
           fmt::format("work object {} is not in the files handed over: --frames tells its value", shown(frame.name));
-    return known_frame(std::move(frame));
+    return add_once(program_, std::move(frame));
   }
   const Told<Data> data = named(*expression, *where);
   if (data) {
@@ -215,10 +212,10 @@ std::size_t Tools::frame_of(const Expression* argument, const Scope& scope) {
   const Told<Data> parts = data ? aggregate(*data, 5) : because(data.error());
   if (!parts) {
     frame.why_not = fmt::format("work object {}: {}", shown(frame.name), parts.error());
-    return known_frame(std::move(frame));
+    return add_once(program_, std::move(frame));
   }
   read_frame(*parts, frame);
-  return frame_at_[data->node] = known_frame(std::move(frame));
+  return frame_at_[data->node] = add_once(program_, std::move(frame));
 }
 
 void Tools::read_frame(const Data& parts, ProgramFrame& frame) const {

@@ -44,7 +44,6 @@ class Tools {
   };
 
   std::size_t known_tool(ProgramTool tool);
-  std::size_t known_frame(ProgramFrame frame);
   /// The aggregate of `parts` parts that a part of a tool or work object is or stands for.
   [[nodiscard]] Told<Data> aggregate(const Data& of, std::size_t parts) const;
   [[nodiscard]] Told<Pose> pose(const Data& of, int* rotation_decimals) const;

@@ -40,7 +40,16 @@ struct Value {
 struct Variable {
   Value value;
   std::string changed;
+  /// Constants that it is set to one after the other, each until the next; empty: `value` is its only one.
+  std::vector<Value> in_order = {};
+  bool is_global = false, is_local = false;  ///< as any of its assignments says
+  std::set<std::size_t> functions = {};      ///< that set it, by the piece of their `def`
+  std::string set_again = {};                ///< where
 };
+
+/// Which of its constants a variable that is set in order has; kUndecided: another one on each way.
+using Settings = std::map<std::string, std::size_t>;
+constexpr std::size_t kUndecided = static_cast<std::size_t>(-1);
 
 /// What `set_payload` said.
 struct Load {
@@ -69,6 +78,7 @@ const std::array<Superposed, 3>& superposed() {
 struct State {
   std::size_t tool = 0, load = 0;   ///< load 0: not said
   std::array<int, 3> superposed{};  ///< the line that begins each; 0: it does not hold
+  Settings settings = {};
   bool operator==(const State&) const = default;
 };
 
@@ -102,26 +112,34 @@ class Script {
   void read() {
     program_.mark_places.push_back({text_.starts_with("\xEF\xBB\xBF") ? std::size_t{3} : 0, "# "});
     const std::size_t tool = unknown_tool();
-    for (std::size_t at = 0; at < pieces_.size(); ++at) note_assignment(at);
+    for (std::size_t at = 0; at < pieces_.size(); ++at) {
+      note_block(at);
+      note_assignment(at);
+    }
     for (std::size_t at = 0; at < pieces_.size(); ++at) note_parameters(at);
+    for (auto& [name, variable] : variables_) find_order(variable);
     note_cuts();
     find_steps();
     Flow flow = flow_of(steps_);
     flow.entries = {0};
     const std::vector<State> states = states_before(
-        flow, State{tool, 0, {}}, [&](std::size_t s, State& state) { set(step_at_[s], state); },
+        flow, State{tool, 0, {}}, [&](std::size_t s, State& state) { set(s, state); },
         [&](State& state, const State& other, const std::string& by) { join(state, other, by); });
     for (std::size_t s = 0; s < steps_.size(); ++s) {
+      if (sets_[s] != nullptr) continue;
       const std::size_t at = step_at_[s];
+      if (pieces_[at].is("set_gravity")) note_gravity(at);
       if (is_motion(pieces_[at])) {
         tool_ = tool_carrying(states[s]);
         superposed_ = states[s].superposed;
+        now_ = &states[s].settings;
         move_of_.emplace(s, program_.moves.size());
         motion(at);
       }
       if (pieces_[at].is("servoj") || pieces_[at].is("servoc") || pieces_[at].is("speedl"))
         leave(pieces_[at], std::string(pieces_[at].text), "it follows what is computed at run time");
     }
+    now_ = nullptr;
     note_order(flow);
     for (std::size_t at = 0; at < pieces_.size(); ++at) note_reading(at);
   }
@@ -137,7 +155,7 @@ class Script {
     }
     target.coordinates = Coordinates::kRotationVector;
     if (value.kind == Value::Kind::kPose) return rewrite_numbers(value, target);
-    const Told<Pose> pose = pose_of_value(value, 0);
+    const Told<Pose>& pose = poses_.at(site.begin);
     if (!pose) return pose.error();
     target.numbers = numbers_of(Coordinates::kRotationVector, *pose, std::vector<double>(6, 0.0));
     fold(value, target);
@@ -158,11 +176,16 @@ class Script {
     for (std::size_t at = 0; at + 1 < pieces_.size(); ++at) {
       if (pieces_[at].is("def")) functions.emplace(pieces_[at + 1].text);
     }
-    const auto add = [&](Step step, std::size_t at) {
+    auto next = assignments_.begin();
+    const auto add = [&](Step step, std::size_t at, const Assignment* assignment = nullptr) {
       steps_.push_back(std::move(step));
       step_at_.push_back(at);
+      sets_.push_back(assignment);
     };
     for (std::size_t at = 0; at < pieces_.size(); ++at) {
+      // What an assignment calls comes before it.
+      for (; next != assignments_.end() && next->first <= at; ++next)
+        if (variables_.at(next->second.name).in_order.size() > 1) add({Kind::kPlain}, at, &next->second);
       if (pieces_[at].kind != Piece::Kind::kWord) continue;
       const bool is_call = at + 1 < pieces_.size() && pieces_[at + 1].is("(");
       if (defines(pieces_[at]) && at + 1 < pieces_.size()) {
@@ -200,12 +223,19 @@ class Script {
   void note_order(const Flow& flow) {
     const auto before = motions_before(flow, [&](std::size_t s) -> std::optional<std::size_t> {
       if (const auto move = move_of_.find(s); move != move_of_.end()) return move->second;
-      return is_followed(pieces_[step_at_[s]]) ? std::optional<std::size_t>(kNoMotion) : std::nullopt;
+      return sets_[s] == nullptr && is_followed(pieces_[step_at_[s]]) ? std::optional<std::size_t>(kNoMotion)
+                                                                      : std::nullopt;
     });
     for (const auto& [step, move] : move_of_) program_.moves[move].before = before[step];
   }
 
-  void set(std::size_t at, State& state) {
+  void set(std::size_t step, State& state) {
+    const std::size_t at = step_at_[step];
+    if (const Assignment* assignment = sets_[step]; assignment != nullptr) {
+      state.settings[assignment->name] = assignment->number;
+      return;
+    }
+    now_ = &state.settings;
     if (at + 1 >= pieces_.size() || !pieces_[at + 1].is("(")) return;
     for (std::size_t k = 0; k < state.superposed.size(); ++k) {
       if (superposed()[k].begins.contains(pieces_[at].text)) state.superposed[k] = pieces_[at].line;
@@ -220,6 +250,11 @@ class Script {
   void join(State& state, const State& other, const std::string& by) {
     for (std::size_t k = 0; k < state.superposed.size(); ++k)
       state.superposed[k] = std::max(state.superposed[k], other.superposed[k]);
+    for (auto& [name, number] : state.settings) {
+      const auto there = other.settings.find(name);
+      if (there == other.settings.end() || there->second != number) number = kUndecided;
+    }
+    for (const auto& [name, number] : other.settings) state.settings.try_emplace(name, kUndecided);
     const std::string why =
         by.empty() ? "a branch or a loop of the script decides it" : fmt::format("{} may change it", by);
     if (state.tool != other.tool && program_.tools[state.tool].why_not.empty()) {
@@ -313,7 +348,10 @@ class Script {
     if (pieces_[at].kind != Piece::Kind::kWord) return;
     const auto variable = variables_.find(std::string(pieces_[at].text));
     if (variable == variables_.end() || !variable->second.changed.empty()) return;
-    const Value& value = variable->second.value;
+    if (variable->second.in_order.empty()) return note_reading(at, variable->second.value);
+    for (const Value& value : variable->second.in_order) note_reading(at, value);
+  }
+  void note_reading(std::size_t at, const Value& value) {
     if (!values_.contains(value.begin) || value.numbers.empty()) return;
     const bool set_here =
         at + 1 < pieces_.size() && pieces_[at + 1].is("=") && !pieces_[std::min(at + 2, pieces_.size() - 1)].is("=");
@@ -397,7 +435,56 @@ class Script {
     return at >= pieces_.size() || pieces_[at].line != line || pieces_[at].is(",") || pieces_[at].is(")");
   }
 
-  /// `global p1 = p[...]`; what is set twice or in part is decided at run time.
+  /// An assignment of a constant to a variable that has several.
+  struct Assignment {
+    std::string name;
+    std::size_t number = 0;
+  };
+
+  /// A variable that constants alone are assigned to has each of them until the next, if all its assignments mean one
+  /// variable: none is local, and they stand in one function or it is global.
+  static void find_order(Variable& variable) {
+    if (variable.in_order.size() < 2) return variable.in_order.clear();
+    const bool is_one = !variable.is_local && (variable.is_global || variable.functions.size() < 2);
+    const bool constant = std::all_of(variable.in_order.begin(), variable.in_order.end(), [](const Value& value) {
+      return value.kind == Value::Kind::kPose || value.kind == Value::Kind::kJoints;
+    });
+    if (variable.changed.empty() && is_one && constant) return;
+    if (variable.changed.empty()) variable.changed = variable.set_again;
+    variable.in_order.clear();
+  }
+
+  /// The blocks that are open at a piece, one after the other.
+  void note_block(std::size_t at) {
+    if (pieces_[at].kind != Piece::Kind::kWord) return;
+    if (defines(pieces_[at]) || pieces_[at].is("if") || pieces_[at].is("while")) open_.push_back(at);
+    if (pieces_[at].is("end") && !open_.empty()) open_.pop_back();
+  }
+  /// The piece of the `def` or `thread` that is open; one behind all of them: none is.
+  [[nodiscard]] std::size_t function_here() const {
+    const auto own =
+        std::find_if(open_.rbegin(), open_.rend(), [&](std::size_t block) { return defines(pieces_[block]); });
+    return own == open_.rend() ? pieces_.size() : *own;
+  }
+
+  /// `set_gravity([0, 0, 9.82])`: away from the ground.
+  void note_gravity(std::size_t at) {
+    std::vector<double> up;
+    for (std::size_t k = at + 2; k < pieces_.size() && !pieces_[k].is(")"); ++k) {
+      if (pieces_[k].kind == Piece::Kind::kNumber)
+        up.push_back(read_number(pieces_[k].text).value_or(WrittenNumber{}).value);
+    }
+    const std::string& file = program_.files[index_].name;
+    const Vector3 up_B = up.size() == 3 ? Vector3(up[0], up[1], up[2]) : Vector3(Vector3::Zero());
+    if (up_B.norm() > 0)
+      program_.ups.push_back({up_B.normalized(), "set_gravity", file, pieces_[at].line});
+    else
+      program_.notes.push_back(
+          fmt::format("set_gravity ({} line {}) is not constant: it is not compared with the cell's gravity", file,
+                      pieces_[at].line));
+  }
+
+  /// `global p1 = p[...]`; what is set in part is decided at run time.
   void note_assignment(std::size_t at) {
     if (pieces_[at].kind != Piece::Kind::kWord || at + 1 >= pieces_.size()) return;
     const bool first = at == 0 || pieces_[at - 1].line != pieces_[at].line || pieces_[at - 1].is("global") ||
@@ -410,15 +497,21 @@ class Script {
     }
     if (equals + 1 >= pieces_.size() || !pieces_[equals].is("=") || pieces_[equals + 1].is("=")) return;
     Variable& variable = variables_[name];
-    const bool again = variable.value.end > 0 || equals != at + 1;
+    const bool again = variable.value.end > 0, in_part = equals != at + 1;
     const std::string why =
         fmt::format("{} is set at run time ({} line {})", shown(name), program_.files[index_].name, pieces_[at].line);
     std::size_t next = equals + 1;
     const Value value = value_at(next);
-    if (again) variable.changed = why;
+    if (in_part) variable.changed = why;
+    if (again) variable.set_again = why;
     variable.value = value;
     if (next < pieces_.size() && pieces_[next].line == value.line && !ends_here(next, value.line))
       variable.value.kind = Value::Kind::kOther;
+    variable.is_global |= at > 0 && pieces_[at - 1].is("global");
+    variable.is_local |= at > 0 && pieces_[at - 1].is("local");
+    variable.functions.insert(function_here());
+    assignments_.emplace(next, Assignment{name, variable.in_order.size()});
+    variable.in_order.push_back(variable.value);
   }
 
   /// `def drill(hole, depth=0.01):` hides what is called so elsewhere.
@@ -433,29 +526,38 @@ class Script {
     }
   }
 
-  Told<Value> resolved(const Value& value) const {
+  /// `stored`: it was made before, when a variable may have been another one.
+  Told<Value> resolved(const Value& value, bool stored = false) const {
     Value now = value;
     for (int depth = 0; now.kind == Value::Kind::kName && depth < kDeepest; ++depth) {
       const auto variable = variables_.find(now.name);
       if (variable == variables_.end()) return because(fmt::format("{} is not in the script", shown(now.name)));
       if (!variable->second.changed.empty()) return because(variable->second.changed);
-      now = variable->second.value;
+      if (variable->second.in_order.empty()) {
+        now = variable->second.value;
+        continue;
+      }
+      const auto set = now_ == nullptr ? Settings::const_iterator() : now_->find(now.name);
+      const bool decided = now_ != nullptr && set != now_->end() && set->second != kUndecided;
+      if (!decided || stored || depth > 0) return because(variable->second.set_again);
+      now = variable->second.in_order[set->second];
     }
     return now;
   }
 
-  Told<Pose> pose_of_value(const Value& value, int depth) const {
-    const Told<Value> now = resolved(value);
+  Told<Pose> pose_of_value(const Value& value, int depth, bool stored = false) const {
+    const Told<Value> now = resolved(value, stored);
+    const bool inner = stored || value.kind == Value::Kind::kName;
     if (!now) return because(now.error());
     if (now->kind == Value::Kind::kPose) return pose_of(Coordinates::kRotationVector, numbers_in(*now));
     if (now->kind != Value::Kind::kCall) return because("it is not constant");
     const std::size_t due = now->name == "pose_inv" ? 1 : 2;
     if (!is_function_of_poses(now->name) || now->arguments.size() != due || depth > kDeepest)
       return because(fmt::format("the function {} decides it", shown(now->name)));
-    const Told<Pose> left = pose_of_value(now->arguments[0], depth + 1);
+    const Told<Pose> left = pose_of_value(now->arguments[0], depth + 1, inner);
     if (!left) return left;
     if (due == 1) return left->inverse();
-    const Told<Pose> right = pose_of_value(now->arguments[1], depth + 1);
+    const Told<Pose> right = pose_of_value(now->arguments[1], depth + 1, inner);
     if (!right) return right;
     if (now->name == "pose_trans") return *left * *right;
     return make_pose(left->linear() * right->linear(), left->translation() + right->translation());
@@ -559,6 +661,7 @@ class Script {
                                                    : std::string("an expression decides it"));
     }
     values_[now->begin] = *now;
+    if (now->kind == Value::Kind::kCall) poses_.insert_or_assign(now->begin, pose_of_value(value, 0));
     if (now->kind == Value::Kind::kJoints)
       program_.moves.back().axes = in_degrees(Coordinates::kJointRadians, numbers_in(*now));
     sites_.add(index_, now->begin, name,
@@ -610,7 +713,12 @@ class Script {
   std::array<int, 3> superposed_{};             ///< the same
   std::map<std::size_t, std::size_t> move_of_;  ///< of Program::moves, by the step
   std::map<std::string, Variable> variables_;
+  std::vector<std::size_t> open_;                       ///< pieces that open blocks, while assignments are noted
+  std::multimap<std::size_t, Assignment> assignments_;  ///< by the piece behind them
+  std::vector<const Assignment*> sets_;                 ///< of each step; nullptr: it is no such one
+  const Settings* now_ = nullptr;                       ///< what holds where something is asked for
   std::map<std::size_t, Value> values_;
+  std::map<std::size_t, Told<Pose>> poses_;  ///< of values that functions make
 };
 
 }  // namespace

@@ -187,14 +187,15 @@ struct CorrectArguments : ApplyArguments {
   std::vector<std::string> inputs;
   std::string receipt, report, format, frames, task;
   std::vector<std::string> idle_axes;
+  std::vector<double> pulses_per_deg;
   bool allow_failed = false, strict = false, keep_digits = false, undo = false, again = false, split = false,
        keep_joints = false;
   double tolerance_mm = 0;
 
   [[nodiscard]] CorrectProgramArguments of_program() const {
-    return {inputs, model, tool,        payload,      format,  output,      receipt,
-            report, json,  frames,      allow_failed, strict,  keep_digits, undo,
-            again,  split, keep_joints, tolerance_mm, service, idle_axes,   task};
+    return {inputs,      model,        tool,         payload,   format,      output,        receipt, report,
+            json,        frames,       allow_failed, strict,    keep_digits, undo,          again,   split,
+            keep_joints, tolerance_mm, service,      idle_axes, task,        pulses_per_deg};
   }
 };
 
@@ -204,7 +205,7 @@ Status check_table_usage(const CorrectArguments& arguments) {
                                                       {!arguments.frames.empty(), "--frames"},
                                                       {!arguments.idle_axes.empty(), "--idle-axis"},
                                                       {!arguments.task.empty(), "--task"},
-                                                      {!arguments.task.empty(), "--task"},
+                                                      {!arguments.pulses_per_deg.empty(), "--pulses-per-deg"},
                                                       {arguments.split, "--split"},
                                                       {arguments.keep_digits, "--keep-digits"},
                                                       {arguments.keep_joints, "--keep-joints"},
@@ -288,7 +289,7 @@ CLI::Option* add_apply_options(CLI::App& command, ApplyArguments& arguments) {
 
 /// How a program is read.
 void add_reading_options(CLI::App& command, std::string& format, std::string& frames,
-                         std::vector<std::string>& idle_axes, std::string& task) {
+                         std::vector<std::string>& idle_axes, std::string& task, std::vector<double>& pulses_per_deg) {
   const std::string group = "Programs";
   command
       .add_option("--format", format,
@@ -312,6 +313,14 @@ void add_reading_options(CLI::App& command, std::string& format, std::string& fr
                   "Of the backup of an ABB controller that moves several robots: the task whose modules are taken, and "
                   "whose robot (TASK2)")
       ->group(group);
+  command
+      .add_option(
+          "--pulses-per-deg", pulses_per_deg,
+          "Of a Yaskawa job whose positions are in pulses: how many make a degree of each axis, six numbers with "
+          "commas between; negative where the axis counts against the robot file's sense")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->group(group);
 }
 
 /// What predict is asked for: joints, or a program.
@@ -319,9 +328,10 @@ struct PredictArguments : ApplyArguments {
   std::vector<std::string> inputs;
   std::string format, frames, task;
   std::vector<std::string> idle_axes;
+  std::vector<double> pulses_per_deg;
 
   [[nodiscard]] PredictProgramArguments of_program() const {
-    return {inputs, model, tool, payload, format, output, json, frames, service, idle_axes, task};
+    return {inputs, model, tool, payload, format, output, json, frames, service, idle_axes, task, pulses_per_deg};
   }
 };
 
@@ -335,7 +345,8 @@ Status check_usage(const PredictArguments& arguments) {
   const std::pair<bool, const char*> of_programs[] = {{!arguments.format.empty(), "--format"},
                                                       {!arguments.frames.empty(), "--frames"},
                                                       {!arguments.idle_axes.empty(), "--idle-axis"},
-                                                      {!arguments.task.empty(), "--task"}};
+                                                      {!arguments.task.empty(), "--task"},
+                                                      {!arguments.pulses_per_deg.empty(), "--pulses-per-deg"}};
   for (const auto& [said, option] : of_programs) {
     if (said && !program) return failure(ErrorCode::kUsage, "{} is of programs, not of joints", option).of(option);
   }
@@ -365,7 +376,8 @@ void add_predict(CLI::App& app, Action& chosen) {
       "--orientation", arguments->orientation,
       "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...); with a model "
       "file only");
-  add_reading_options(*command, arguments->format, arguments->frames, arguments->idle_axes, arguments->task);
+  add_reading_options(*command, arguments->format, arguments->frames, arguments->idle_axes, arguments->task,
+                      arguments->pulses_per_deg);
   add_apply_options(*command, *arguments)->required();
   command->callback([arguments, &chosen] {
     chosen = [arguments]() -> Result<Extent> {
@@ -379,7 +391,8 @@ void add_predict(CLI::App& app, Action& chosen) {
 
 void add_program_options(CLI::App& command, CorrectArguments& arguments) {
   const std::string group = "Programs";
-  add_reading_options(command, arguments.format, arguments.frames, arguments.idle_axes, arguments.task);
+  add_reading_options(command, arguments.format, arguments.frames, arguments.idle_axes, arguments.task,
+                      arguments.pulses_per_deg);
   command.add_option("--report", arguments.report, "The receipt as a page, with the path in 3D (HTML)")->group(group);
   command
       .add_flag("--keep-digits", arguments.keep_digits,

@@ -183,8 +183,9 @@ void add_receipts(const Corrected& done, const CorrectProgramArguments& argument
 }
 
 Result<cam::Program> read(const ProgramFiles& files, const CorrectProgramArguments& arguments) {
-  return understood_program(files, {arguments.split, arguments.keep_joints, {}, files.system, arguments.idle_axes},
-                            arguments.frames);
+  cam::ReadOptions reading{arguments.split, arguments.keep_joints, {}, files.system, arguments.idle_axes};
+  reading.pulses_per_deg = arguments.pulses_per_deg;
+  return understood_program(files, std::move(reading), arguments.frames);
 }
 
 }  // namespace

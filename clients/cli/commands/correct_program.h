@@ -18,7 +18,8 @@ struct CorrectProgramArguments {
   double tolerance_mm = 0;  ///< 0: none
   ServiceOptions service;
   std::vector<std::string> idle_axes = {};
-  std::string task = {};  ///< of an ABB backup
+  std::string task = {};                    ///< of an ABB backup
+  std::vector<double> pulses_per_deg = {};  ///< of a Yaskawa job
 };
 
 [[nodiscard]] Result<Extent> correct_program(const CorrectProgramArguments& arguments);

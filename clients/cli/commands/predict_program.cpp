@@ -92,6 +92,7 @@ Result<Extent> predict_program(const PredictProgramArguments& arguments) {
   cam::ReadOptions reading;
   reading.split = true;  // nothing is written, so a point may be used in several ways
   reading.idle_axes = arguments.idle_axes;
+  reading.pulses_per_deg = arguments.pulses_per_deg;
   const Result<cam::Program> program = understood_program(*files, reading, arguments.frames);
   if (!program) return tl::make_unexpected(program.error());
   const Result<cam::PredictedProgram> predicted =

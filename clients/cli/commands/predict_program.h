@@ -15,7 +15,8 @@ struct PredictProgramArguments {
   std::string model, tool, payload, format, output, json, frames;
   ServiceOptions service;
   std::vector<std::string> idle_axes = {};
-  std::string task = {};  ///< of an ABB backup
+  std::string task = {};                    ///< of an ABB backup
+  std::vector<double> pulses_per_deg = {};  ///< of a Yaskawa job
 };
 
 /// A target that nothing can be said of makes it Extent::kPart.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -76,12 +77,17 @@ bool is_of_the_controller(const std::string& name) {
                      [&](const fs::path& part) { return kFolders.contains(lower(part.string())); });
 }
 
-/// The system parameters of ABB backups that a folder is, or holds.
-Result<std::vector<cam::SourceFile>> parameters_in(const std::string& folder) {
+/// ABB's system parameters.
+const std::set<std::string> kParameters = {"moc.cfg"};
+/// FANUC's system variables that hold frames and tools, as text.
+const std::set<std::string> kSystemFrames = {"sysframe.va", "framevar.va"};
+
+/// The files of a folder that are called so, in lower case.
+Result<std::vector<cam::SourceFile>> files_called(const std::set<std::string>& names, const std::string& folder) {
   std::vector<cam::SourceFile> found;
   std::error_code error;
   for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
-    if (lower(it->path().filename().string()) != "moc.cfg" || !it->is_regular_file(error)) continue;
+    if (!names.contains(lower(it->path().filename().string())) || !it->is_regular_file(error)) continue;
     Result<std::string> text = read_text_file(it->path().string(), kLargest);
     if (!text) return tl::make_unexpected(text.error());
     found.push_back({fs::relative(it->path(), folder, error).string(), std::move(*text)});
@@ -89,13 +95,25 @@ Result<std::vector<cam::SourceFile>> parameters_in(const std::string& folder) {
   return found;
 }
 
-/// Those below the folder of a task.
-void keep_task(const std::string& task, std::vector<Found>& programs) {
-  std::erase_if(programs, [&](const Found& program) {
+/// Keeps those below the folder of a task, and returns the others.
+std::vector<Found> keep_task(const std::string& task, std::vector<Found>& programs) {
+  const auto others = std::stable_partition(programs.begin(), programs.end(), [&](const Found& program) {
     const fs::path path(program.name);
-    return std::none_of(path.begin(), path.end(),
-                        [&](const fs::path& part) { return lower(part.string()) == lower(task); });
+    return std::any_of(path.begin(), path.end(),
+                       [&](const fs::path& part) { return lower(part.string()) == lower(task); });
   });
+  std::vector<Found> left(std::make_move_iterator(others), std::make_move_iterator(programs.end()));
+  programs.erase(others, programs.end());
+  return left;
+}
+
+Status read_into(std::vector<cam::SourceFile>& files, const std::vector<Found>& found) {
+  for (const Found& file : found) {
+    Result<std::string> text = read_text_file(file.path, kLargest);
+    if (!text) return tl::make_unexpected(text.error());
+    files.push_back({file.name, std::move(*text)});
+  }
+  return {};
 }
 
 Result<std::string> standard_input() {
@@ -134,12 +152,17 @@ Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, 
     if (fs::is_directory(input, error)) {
       std::vector<Found> inside = programs_in(input, wanted);
       if (inside.empty()) return refused("a folder without programs").in(input);
-      if (!task.empty()) keep_task(task, inside);
+      std::vector<Found> other_tasks;
+      if (!task.empty()) other_tasks = keep_task(task, inside);
       if (inside.empty())
         return refused("no programs of a task {}", shown(task)).in(input).of("--task").with_text(task);
-      Result<std::vector<cam::SourceFile>> parameters = parameters_in(input);
-      if (!parameters) return tl::make_unexpected(parameters.error());
-      program.parameters.insert(program.parameters.end(), parameters->begin(), parameters->end());
+      if (const Status read = read_into(program.beside, other_tasks); !read) return tl::make_unexpected(read.error());
+      for (const auto& [names, into] :
+           {std::pair(kParameters, &program.parameters), std::pair(kSystemFrames, &program.beside)}) {
+        Result<std::vector<cam::SourceFile>> files = files_called(names, input);
+        if (!files) return tl::make_unexpected(files.error());
+        into->insert(into->end(), files->begin(), files->end());
+      }
       found.insert(found.end(), inside.begin(), inside.end());
       for (const Found& file : inside)
         if (is_of_the_controller(file.name)) program.system.insert(file.name);
@@ -251,6 +274,21 @@ Status check_used(const std::vector<GivenPose>& rows, const std::string& path, c
 
 namespace {
 
+/// Six numbers, of a Yaskawa job.
+Status check_pulses(const ProgramFiles& files, const std::vector<double>& pulses_per_deg) {
+  constexpr std::size_t kAxes = 6;
+  constexpr double kLeast = 1e-3;
+  if (pulses_per_deg.empty()) return {};
+  const auto fail = [](std::string what) { return failure(ErrorCode::kUsage, "{}", what).of("--pulses-per-deg"); };
+  if (files.dialect != cam::Dialect::kInform)
+    return fail(fmt::format("a {} program has no pulses", cam::name_of(files.dialect)));
+  if (pulses_per_deg.size() != kAxes) return fail(fmt::format("{} numbers, 6 are due", pulses_per_deg.size()));
+  for (const double number : pulses_per_deg) {
+    if (!(std::abs(number) >= kLeast) || !std::isfinite(number)) return fail("an axis without pulses to a degree");
+  }
+  return {};
+}
+
 /// What an ABB backup says of its robot.
 Result<std::vector<cam::ControllerRobot>> robots_of(const ProgramFiles& files) {
   std::vector<cam::ControllerRobot> robots;
@@ -267,6 +305,7 @@ Result<std::vector<cam::ControllerRobot>> robots_of(const ProgramFiles& files) {
 
 Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOptions options,
                                         const std::string& frames) {
+  if (const Status told = check_pulses(files, options.pulses_per_deg); !told) return tl::make_unexpected(told.error());
   const auto robots = robots_of(files);
   if (!robots) return tl::make_unexpected(robots.error());
   for (const cam::ControllerRobot& robot : *robots) cam::take_stated(cam::stated_by(robot), options.stated);
@@ -277,6 +316,7 @@ Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOpti
     rows = std::move(*given);
   }
   for (const GivenPose& row : rows) options.frames.emplace(row.name, row.X);
+  options.beside = files.beside;
   cam::Program program = cam::read_program(files.dialect, files.files, options);
   if (const Status whole = cam::check_files(program); !whole) return tl::make_unexpected(whole.error());
   for (const cam::ControllerRobot& robot : *robots) {

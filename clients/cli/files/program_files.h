@@ -21,6 +21,7 @@ struct ProgramFiles {
       {};  ///< names of files that belong to the controller and were found in a folder: read, not written
   std::vector<cam::SourceFile> parameters = {};  ///< MOC.cfg of an ABB backup that a folder is
   std::string task = {};                         ///< of RAPID, whose modules were taken; empty: of all
+  std::vector<cam::SourceFile> beside = {};      ///< read for values alone: other tasks, FANUC's system variables
 };
 
 /// Whether the inputs are a robot program. Otherwise they are one table of targets (.csv).

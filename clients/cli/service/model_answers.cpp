@@ -11,6 +11,7 @@ cam::CellTools tools_of(const CompensatedModel& model) {
     if (!known) return tl::make_unexpected(known.error());
     return {};
   };
+  if (cell.X_WB) cell.gravity_B = cell.X_WB->linear().transpose() * model.cell().gravity_W;
   return cell;
 }
 

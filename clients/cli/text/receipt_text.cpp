@@ -59,6 +59,8 @@ const char* spelled(cam::Coordinates coordinates) {
       return "joints_deg";
     case cam::Coordinates::kJointRadians:
       return "joints_rad";
+    case cam::Coordinates::kJointPulses:
+      return "joints_pulses";
   }
   return "";
 }
