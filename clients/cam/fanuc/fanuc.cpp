@@ -8,6 +8,9 @@
 #include <cstdlib>
 #include <set>
 
+#include "clients/cam/fanuc/controller.h"
+#include "clients/cam/fanuc/positions.h"
+#include "clients/cam/fanuc/statements.h"
 #include "clients/cam/fanuc/system_frames.h"
 #include "clients/cam/flow.h"
 #include "clients/cam/scan.h"
@@ -19,30 +22,26 @@ namespace trammel::cam {
 
 namespace {
 
+using fanuc::called_by;
+using fanuc::constant_at;
+using fanuc::Controller;
+using fanuc::done_perhaps;
+using fanuc::Group;
+using fanuc::indexed;
+using fanuc::is_group;
+using fanuc::is_number;
+using fanuc::macro_in;
+using fanuc::number;
+using fanuc::Part;
+using fanuc::part_of;
+using fanuc::Pieces;
+using fanuc::Position;
+using fanuc::positions_of;
+using fanuc::Setting;
+using fanuc::statements_of;
+
 constexpr std::array<const char*, 6> kPose = {"X", "Y", "Z", "W", "P", "R"};
 constexpr std::array<const char*, 6> kJoints = {"J1", "J2", "J3", "J4", "J5", "J6"};
-
-using Pieces = std::vector<Piece>;
-
-/// Values of one motion group of a position.
-struct Group {
-  std::map<std::string, Piece> values;
-  std::string frame, tool, config;
-};
-
-struct Position {
-  std::size_t begin = 0, end = 0;
-  int line = 1;
-  std::string name;  ///< `P[3]`
-  std::map<int, Group> groups;
-  std::string changed;
-};
-
-/// PR[m] as far as the program sets it: by elements.
-struct Register {
-  std::array<std::optional<double>, 6> elements;
-  std::string changed;  ///< why it is not constant
-};
 
 /// What UFRAME_NUM and UTOOL_NUM select: a number; empty: not set; else why it is not known.
 struct Selected {
@@ -51,80 +50,8 @@ struct Selected {
   std::string follows;  ///< what moves the targets at run time, `Track TAST[1]`; or empty
   bool operator==(const Selected&) const = default;
 };
-/// `UFRAME[1]=PR[5]`
-struct Setting {
-  std::string from, where;
-  std::size_t file = 0;
-  std::string changed = {};  ///< why its value is not constant
-};
-/// What all programs of a controller share.
-struct Controller {
-  std::map<std::string, Register> registers;
-  std::map<std::string, Setting> settings;  ///< of UFRAME[n] and UTOOL[n]
-  struct Statements {
-    std::string first;  ///< where
-    int count = 0;
-  };
-  std::map<std::string, Statements> loads;           ///< of PAYLOAD[n]
-  std::map<std::string, fanuc::SystemFrame> system;  ///< UFRAME[n] and UTOOL[n] of the system variables
-  std::map<std::string, std::string> taken;          ///< those of them that targets have, with the file
-  std::set<std::string> programs;                    ///< that are read, by name
-};
-bool is_number(const std::string& text) {
-  return !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
-}
-
-double number(const Piece& piece) {
-  const auto written = read_number(piece.text);
-  return written ? written->value : 0;
-}
 
 constexpr const char* kDecided = "a branch, a jump or a loop of the program, or a caller, decides it";
-
-/// `-12.5`, `(-12.5)`, up to the end of a statement.
-std::optional<double> constant_at(const Pieces& statement, std::size_t at) {
-  const bool in_brackets = at + 3 == statement.size() && statement[at].is("(") && statement[at + 2].is(")");
-  const std::size_t value = in_brackets ? at + 1 : at;
-  if (!in_brackets && at + 1 != statement.size()) return std::nullopt;
-  return statement[value].kind == Piece::Kind::kNumber ? std::optional<double>(number(statement[value])) : std::nullopt;
-}
-
-/// `IF (R[1]=1),PR[5,1]=(200)`: where what it may do begins; 0: the statement is no such one.
-std::size_t done_perhaps(const Pieces& statement) {
-  int depth = 0;
-  for (std::size_t at = 0; at + 1 < statement.size() && statement[0].is("IF"); ++at) {
-    if (statement[at].is("[") || statement[at].is("(")) ++depth;
-    if (statement[at].is("]") || statement[at].is(")")) --depth;
-    if (statement[at].is(",") && depth == 0) return at + 1;
-  }
-  return 0;
-}
-
-bool is_group(const Piece& piece) { return piece.text.size() == 3 && piece.text.starts_with("GP"); }
-
-/// Without comments of points and registers, `P[1:don't]`, and without texts: words in them mean nothing.
-Pieces without_comments(const Pieces& pieces) {
-  Pieces kept;
-  const auto skip_to = [&](std::size_t at, std::string_view end) {
-    std::size_t to = at + 1;
-    while (to < pieces.size() && !pieces[to].is(end)) ++to;
-    return to;
-  };
-  int depth = 0;
-  for (std::size_t at = 0; at < pieces.size(); ++at) {
-    if (depth > 0 && pieces[at].is(":") && !is_group(pieces[at - 1])) at = skip_to(at, "]");
-    if (depth == 0 && pieces[at].is("'")) {
-      const std::size_t end = skip_to(at, "'");
-      if (end < pieces.size()) at = end;
-      continue;
-    }
-    if (at >= pieces.size()) break;
-    if (pieces[at].is("[")) ++depth;
-    if (pieces[at].is("]")) --depth;
-    kept.push_back(pieces[at]);
-  }
-  return kept;
-}
 
 class File {
  public:
@@ -138,12 +65,16 @@ class File {
 
   /// Its positions, and what it sets.
   void read() {
-    note_name();
-    const Part motions = part_of("/MN"), positions = part_of("/POS");
+    name_ = fanuc::name_of_program(program_.files[index_]);
+    controller_.programs.insert(name_);
+    const Part motions = part_of(text_, "/MN");
     program_.mark_places.push_back({motions.begin, "   0:  !", " ;", true});
-    read_positions(pieces_of(text_, positions.begin, positions.end, positions.line, {"", "'\""}));
-    read_statements(motions);
-    note_line_tracking(part_of("/APPL"));
+    for (Position& position : positions_of(text_, part_of(text_, "/POS"))) {
+      by_name_[position.name] = position.begin;
+      positions_[position.begin] = std::move(position);
+    }
+    statements_ = statements_of(text_, motions);
+    note_line_tracking(part_of(text_, "/APPL"));
     for (const Pieces& statement : statements_) note_setting(statement);
   }
 
@@ -159,7 +90,7 @@ class File {
       if (statement[0].is("CALL")) return {call};
       return {{Step::Kind::kIf}, call, {Step::Kind::kEnd}};
     }
-    Step step = step_of(statement);
+    Step step = fanuc::step_of(statement);
     const bool jumps = step.kind == Step::Kind::kJump || step.kind == Step::Kind::kJumpMaybe;
     jumps_anywhere_ |= jumps && !is_number(step.label);
     if (jumps || step.kind == Step::Kind::kLabel) step.label = fmt::format("{}:{}", index_, step.label);
@@ -199,7 +130,7 @@ class File {
     for (const auto& [number_of_group, other] : position.groups) {
       if (number_of_group > 1 && other.values.contains("X"))
         return fmt::format("its group {} is another robot", number_of_group);
-      note_external(number_of_group, other, target);
+      fanuc::note_external(number_of_group, other, target);
     }
     const bool joints = group.values.contains("J1");
     if (joints && options_.keep_joints) return "joint targets are kept (--keep-joints)";
@@ -212,138 +143,11 @@ class File {
       target.numbers.push_back(written->value);
       target.rewrites.push_back({{value->second.begin, value->second.end}, {}, {{k, written->style}}});
     }
-    if (!joints) target.configuration = configuration_of(group.config);
+    if (!joints) target.configuration = fanuc::configuration_of(group.config);
     return "";
   }
 
  private:
-  /// `/PROG  WELD1`; of a file without it its own name.
-  void note_name() {
-    const std::size_t head = text_.find("/PROG");
-    const std::size_t end = head == std::string::npos ? head : text_.find('\n', head);
-    const Pieces pieces =
-        head == std::string::npos ? Pieces{} : pieces_of(text_, head, std::min(end, text_.size()), 1, {"", ""});
-    const std::string& file = program_.files[index_].name;
-    const std::size_t folder = file.rfind('/') + 1;
-    name_ = in_capitals(pieces.size() > 2 ? std::string(pieces[2].text)
-                                          : file.substr(folder, file.rfind('.') - std::min(folder, file.rfind('.'))));
-    controller_.programs.insert(name_);
-  }
-  static std::string in_capitals(std::string text) {
-    for (char& c : text) c = static_cast<char>(c >= 'a' && c <= 'z' ? c - 'a' + 'A' : c);
-    return text;
-  }
-
-  /// `CALL SUB(1)`, `IF R[1]=1,CALL SUB`; empty: it calls nothing.
-  static std::string called_by(const Pieces& statement) {
-    for (std::size_t at = 0; at + 1 < statement.size(); ++at) {
-      if (statement[at].is("CALL")) return in_capitals(std::string(statement[at + 1].text));
-    }
-    return "";
-  }
-
-  struct Part {
-    std::size_t begin = 0, end = 0;
-    int line = 1;
-  };
-
-  /// What stands between a line that is `head` and the next that begins with `/`.
-  [[nodiscard]] Part part_of(const std::string& head) const {
-    Part part{text_.size(), text_.size(), 1};
-    bool inside = false;
-    int line = 1;
-    for (std::size_t at = 0; at < text_.size(); ++line) {
-      const std::size_t end = std::min(text_.find('\n', at), text_.size() - 1) + 1;
-      const std::size_t first = text_.find_first_not_of(" \t", at);
-      if (first < end && text_[first] == '/') {
-        if (inside) {
-          part.end = at;
-          return part;
-        }
-        const std::size_t stop = text_.find_first_of(" \t\r\n", first);
-        inside = text_.substr(first, std::min(stop, end) - first) == head;
-        if (inside) part = {end, text_.size(), line + 1};
-      }
-      at = end;
-    }
-    return part;
-  }
-
-  /// `P[3:"hole"]{ GP1: UF : 1, UT : 2, CONFIG : 'N U T, 0, 0, 0', X = 1.000 mm, ... };`
-  void read_positions(const Pieces& pieces) {
-    for (std::size_t at = 0; at + 3 < pieces.size(); ++at) {
-      if (!pieces[at].is("P") || !pieces[at + 1].is("[") || pieces[at + 2].kind != Piece::Kind::kNumber) continue;
-      Position position;
-      position.begin = pieces[at].begin;
-      position.line = pieces[at].line;
-      position.name = fmt::format("P[{}]", pieces[at + 2].text);
-      while (at < pieces.size() && !pieces[at].is("{")) ++at;
-      const std::size_t begin = at;
-      while (at < pieces.size() && !pieces[at].is("}")) ++at;
-      position.end = at < pieces.size() ? pieces[at].end : text_.size();
-      read_groups(pieces, begin, at, position);
-      by_name_[position.name] = position.begin;
-      positions_[position.begin] = std::move(position);
-    }
-  }
-
-  static void read_groups(const Pieces& pieces, std::size_t begin, std::size_t end, Position& position) {
-    int group = 1;
-    for (std::size_t at = begin; at + 2 < end; ++at) {
-      const std::string word(pieces[at].text);
-      if (pieces[at].kind != Piece::Kind::kWord) continue;
-      Group& now = position.groups[group];
-      if (word.starts_with("GP") && pieces[at + 1].is(":")) {
-        group = std::atoi(word.c_str() + 2);
-        continue;
-      }
-      if (pieces[at + 1].is("=")) {
-        if (pieces[at + 2].kind == Piece::Kind::kNumber) now.values[word] = pieces[at + 2];
-      } else if (pieces[at + 1].is(":")) {
-        if (word == "UF") now.frame = std::string(pieces[at + 2].text);
-        if (word == "UT") now.tool = std::string(pieces[at + 2].text);
-        if (word == "CONFIG") now.config = std::string(pieces[at + 2].text);
-      }
-    }
-    if (position.groups.contains(1) && position.groups[1].values.empty() && position.groups.size() > 1 &&
-        position.groups[1].frame.empty())
-      position.groups.erase(1);
-  }
-
-  /// The statements of /MN: `12:L P[1] 100mm/sec FINE ;`, without their numbers. A quote in one of them, or in a
-  /// remark, is no matter of the next.
-  void read_statements(const Part& part) {
-    std::size_t begin = part.begin;
-    int line = part.line, first_line = part.line;
-    for (std::size_t at = part.begin; at < part.end; ++line) {
-      const std::size_t end = std::min(text_.find('\n', at), part.end - 1) + 1;
-      const std::size_t last = text_.find_last_not_of(" \t\r\n", end - 1);
-      at = end;
-      if (end < part.end && (last == std::string::npos || last < begin || text_[last] != ';')) continue;
-      const std::size_t first = text_.find_first_not_of(" \t\r\n0123456789:", begin);
-      // Remarks: `!hole`, `--eg:hole`, and what is commented out, `//L P[1] ...`.
-      if (first < end && std::string_view("!-/").find(text_[first]) == std::string_view::npos)
-        add_statements(without_comments(pieces_of(text_, begin, end, first_line, {"", ""})));
-      begin = end;
-      first_line = line + 1;
-    }
-  }
-
-  void add_statements(const Pieces& pieces) {
-    std::vector<Pieces> all(1);
-    for (const Piece& piece : pieces) {
-      if (piece.is(";")) {
-        all.emplace_back();
-        continue;
-      }
-      all.back().push_back(piece);
-    }
-    for (Pieces& one : all) {
-      while (!one.empty() && (one[0].kind == Piece::Kind::kNumber || one[0].is(":"))) one.erase(one.begin());
-      if (!one.empty()) statements_.push_back(std::move(one));
-    }
-  }
-
   /// `LINE_TRACK_SCHEDULE_NUMBER : 1` in /APPL; 0 is none.
   void note_line_tracking(const Part& part) {
     const Pieces pieces = pieces_of(text_, part.begin, part.end, part.line, {"", "'\""});
@@ -353,30 +157,6 @@ class File {
       if (pieces[at].is("LINE_TRACK_SCHEDULE_NUMBER") && at + 2 < pieces.size()) scheduled = !pieces[at + 2].is("0");
     }
     if (!scheduled) line_tracking_ = 0;
-  }
-
-  static Step step_of(const Pieces& statement) {
-    using Kind = Step::Kind;
-    if (statement.empty()) return {};
-    const Piece& first = statement[0];
-    if (first.is("LBL")) return {Kind::kLabel, indexed_number(statement, 0)};
-    // `JMP LBL[1]`, `IF R[1]=1,JMP LBL[2]`, `L P[1] 100mm/sec FINE Skip,LBL[3]`, `WAIT DI[1]=ON TIMEOUT,LBL[4]`
-    for (std::size_t at = 1; at < statement.size(); ++at) {
-      if (!statement[at].is("LBL")) continue;
-      const bool always = at == 1 && first.is("JMP");
-      return {always ? Kind::kJump : Kind::kJumpMaybe, indexed_number(statement, at)};
-    }
-    const bool block = statement.back().is("THEN");
-    if (first.is("IF") && block) return {Kind::kIf};
-    if (first.is("ELSE") && statement.size() == 1) return {Kind::kElse};
-    if (first.is("FOR")) return {Kind::kWhile};
-    if (first.is("ENDIF") || first.is("ENDFOR")) return {Kind::kEnd};
-    if ((first.is("END") || first.is("ABORT")) && statement.size() == 1) return {Kind::kReturn};
-    return {};
-  }
-  /// `LBL[3:again]` -> `3`
-  static std::string indexed_number(const Pieces& pieces, std::size_t at) {
-    return at + 2 < pieces.size() ? std::string(pieces[at + 2].text) : std::string();
   }
 
   void select(const Pieces& statement, Selected& selected) const {
@@ -404,86 +184,6 @@ class File {
           fmt::format("{} (line {}) is not known here: it may select another one", shown(macro), statement[0].line);
     if (statement[0].is("LBL") && jumps_anywhere_) selected.frame = selected.tool = kDecided;
     select_number(statement, selected);
-  }
-
-  /// `GRIPPER OPEN`: a macro is called by its name, of any words. Empty: it is an instruction that is known.
-  static std::string macro_in(const Pieces& statement) {
-    static const std::set<std::string_view> kKnown = {"J",
-                                                      "L",
-                                                      "C",
-                                                      "A",
-                                                      "S",
-                                                      "LBL",
-                                                      "JMP",
-                                                      "IF",
-                                                      "ELSE",
-                                                      "ENDIF",
-                                                      "FOR",
-                                                      "ENDFOR",
-                                                      "SELECT",
-                                                      "WAIT",
-                                                      "CALL",
-                                                      "RUN",
-                                                      "END",
-                                                      "ABORT",
-                                                      "PAUSE",
-                                                      "OVERRIDE",
-                                                      "MESSAGE",
-                                                      "UALM",
-                                                      "RSR",
-                                                      "PAYLOAD",
-                                                      "UFRAME_NUM",
-                                                      "UTOOL_NUM",
-                                                      "Arc",
-                                                      "ARC",
-                                                      "Weave",
-                                                      "WEAVE",
-                                                      "Track",
-                                                      "TRACK",
-                                                      "Touch",
-                                                      "TOUCH",
-                                                      "Search",
-                                                      "SEARCH",
-                                                      "SPOT",
-                                                      "BACKUP",
-                                                      "COL",
-                                                      "SKIP",
-                                                      "OFFSET",
-                                                      "TOOL_OFFSET",
-                                                      "MONITOR",
-                                                      "ERROR_PROG",
-                                                      "RESUME_PROG",
-                                                      "LOCK",
-                                                      "UNLOCK",
-                                                      "SOFTFLOAT",
-                                                      "MP",
-                                                      "TORQ_LIMIT",
-                                                      "STOP_TRACKING",
-                                                      "VISION",
-                                                      "TIMER",
-                                                      "VOFFSET",
-                                                      "LINE",
-                                                      "SYNC",
-                                                      "JOINT_MAX_SPEED",
-                                                      "LINEAR_MAX_SPEED",
-                                                      "FORCE",
-                                                      "SENSOR",
-                                                      "DIAG",
-                                                      "POINT_LOGIC",
-                                                      "LINECOUNT",
-                                                      "TOOL_OFFSET_CONDITION",
-                                                      "CLEAR",
-                                                      "TC_ONLINE",
-                                                      "RESET",
-                                                      "PULSE",
-                                                      "RETURN"};
-    const Piece& first = statement[0];
-    const bool is_name = first.kind == Piece::Kind::kWord && first.text[0] != '$' && !kKnown.contains(first.text);
-    const bool sets = statement.size() > 1 && (statement[1].is("[") || statement[1].is("="));
-    if (!is_name || sets) return "";
-    return statement.size() > 1 && statement[1].kind == Piece::Kind::kWord
-               ? fmt::format("{} {}", first.text, statement[1].text)
-               : std::string(first.text);
   }
 
   /// `UFRAME_NUM=1`, `UTOOL_NUM[GP1]=R[2]`, `IF (DI[1]),UFRAME_NUM=2`
@@ -520,17 +220,6 @@ class File {
     }
   }
 
-  /// `PR[5]`, also of `PR[GP1:5]`; `PR[*]` where an index chooses it.
-  static std::string indexed(const Pieces& pieces, std::size_t at) {
-    if (at + 3 >= pieces.size() || !pieces[at + 1].is("[")) return "";
-    const std::string_view word = pieces[at].text;
-    const bool grouped = at + 5 < pieces.size() && is_group(pieces[at + 2]) && pieces[at + 3].is(":");
-    if (grouped && !pieces[at + 2].is("GP1")) return fmt::format("{}[{}]", word, pieces[at + 2].text);
-    if (grouped) at += 2;
-    if (pieces[at + 2].kind != Piece::Kind::kNumber) return fmt::format("{}[*]", word);
-    return fmt::format("{}[{}]", word, pieces[at + 2].text);
-  }
-
   /// `UTOOL[2]=PR[5]`, `PR[5,1]=100`, `PR[5]=LPOS`, `P[1]=...`, also behind `IF (...),`
   void note_setting(const Pieces& whole) {
     const std::size_t begin = done_perhaps(whole);
@@ -546,7 +235,7 @@ class File {
     if (name.empty()) return;
     const std::string why = fmt::format("{} is set at run time ({})", name, where);
     if (word == "PR") {
-      note_register(statement, equals, name, where);
+      controller_.note_register(statement, equals, name, where, index_);
       if (begin > 0) controller_.registers[name].changed = why;
     } else if (word == "UFRAME" || word == "UTOOL") {
       const std::string from = indexed(statement, equals + 1);
@@ -578,130 +267,20 @@ class File {
     }
   }
 
-  void note_register(const Pieces& statement, std::size_t equals, const std::string& name, const std::string& where) {
-    Register& set = controller_.registers[name];
-    const bool element = equals >= 5 && statement[3].is(",") && statement[4].kind == Piece::Kind::kNumber;
-    const std::optional<double> now = constant_at(statement, equals + 1);
-    const int index = element ? static_cast<int>(number(statement[4])) : 0;
-    if (!element || !now || index < 1 || index > 6) {
-      set.changed = fmt::format("{} is set at run time ({})", name, where);
-      return;
-    }
-    std::optional<double>& value = set.elements[static_cast<std::size_t>(index - 1)];
-    const auto took_it = [&](const auto& one) { return one.second.from == name && one.second.file == index_; };
-    if (!value && std::any_of(controller_.settings.begin(), controller_.settings.end(), took_it))
-      set.changed = fmt::format("{} is set behind where it is taken ({})", name, where);
-    if (value && *value != *now) set.changed = fmt::format("{} is set several times ({})", name, where);
-    value = now;
-  }
-
-  /// `UFRAME[R[1]]=PR[2]` sets any of them.
-  [[nodiscard]] const Setting* setting_of(const std::string& name) const {
-    const auto any = controller_.settings.find(name.substr(0, name.find('[')) + "[*]");
-    const auto own = controller_.settings.find(name);
-    if (any != controller_.settings.end()) return &any->second;
-    return own == controller_.settings.end() ? nullptr : &own->second;
-  }
-  [[nodiscard]] const Register* register_of(const std::string& name) const {
-    const auto any = controller_.registers.find("PR[*]");
-    const auto own = controller_.registers.find(name);
-    if (any != controller_.registers.end()) return &any->second;
-    return own == controller_.registers.end() ? nullptr : &own->second;
-  }
-
-  /// What the programs set UFRAME[n] or UTOOL[n] to, or why that is not known.
-  struct Told {
-    std::optional<Pose> X;
-    std::string why;
-    bool by_program = false;  ///< the programs decide the value, known or not
-    std::string where;
-    std::string file = {};
-    int line = 0;
-  };
-  [[nodiscard]] Told setting(const std::string& name) const {
-    const Setting* set = setting_of(name);
-    if (set == nullptr) return by_system(name);
-    if (!set->changed.empty()) return {{}, set->changed, true, ""};
-    const Register* from = register_of(set->from);
-    std::vector<double> numbers;
-    for (std::size_t k = 0; from != nullptr && from->changed.empty() && k < 6; ++k) {
-      if (from->elements[k]) numbers.push_back(*from->elements[k]);
-    }
-    if (numbers.size() == 6) return {pose_of(Coordinates::kAnglesXyz, numbers), "", true, set->where};
-    const std::string why =
-        fmt::format("{} comes from {}, whose value is not constant in the program", name, shown(set->from));
-    // What no file says of a register a row may say.
-    const bool open = from == nullptr && set->from.starts_with("PR[") && !set->from.ends_with("[*]");
-    return {{}, why, !open, ""};
-  }
-
-  /// Of the controller's system variables.
-  [[nodiscard]] Told by_system(const std::string& name) const {
-    const auto known = controller_.system.find(name);
-    if (known == controller_.system.end())
-      return {{}, fmt::format("{} is not in the files handed over: --frames tells its value", name), false, ""};
-    const fanuc::SystemFrame& frame = known->second;
-    if (!frame.why_not.empty()) return {{}, frame.why_not, true, ""};
-    controller_.taken.emplace(name, frame.file);
-    return {frame.X, "", true, fmt::format("{} line {}", frame.file, frame.line), frame.file, frame.line};
-  }
-
-  [[nodiscard]] static std::string why_not_by_row(const std::string& row, const Pose& X, const Told& told,
-                                                  const Pose& X_BW) {
-    if (!told.X) return told.by_program ? told.why : "";
-    return against_row(row, X, X_BW * *told.X, told.where);
-  }
-
   std::size_t add_frame(ProgramFrame frame) { return add_once(program_, std::move(frame)); }
   std::size_t add_tool(ProgramTool tool) { return add_once(program_, std::move(tool)); }
-
-  std::size_t frame_of(const std::string& number_text) {
-    ProgramFrame frame;
-    frame.name = fmt::format("UFRAME[{}]", number_text);
-    if (number_text == "0") return add_frame(std::move(frame));
-    const Told told = setting(frame.name);
-    if (take_row(frame.name, options_, frame)) {
-      const auto stands = options_.frames.find(kRobotBase);
-      const Pose X_BW = stands == options_.frames.end() ? Pose::Identity() : stands->second.inverse();
-      frame.why_not = why_not_by_row(frame.name, frame.X_BO, told, X_BW);
-    } else if (told.X) {
-      frame.X_BO = *told.X;
-    } else {
-      frame.why_not = told.why;
-    }
-    return add_frame(std::move(frame));
-  }
-
-  std::size_t tool_of(const std::string& number_text) {
-    ProgramTool tool;
-    tool.name = fmt::format("UTOOL[{}]", number_text);
-    if (number_text == "0") {
-      tool.X_FT = Pose::Identity();
-      return add_tool(std::move(tool));
-    }
-    const Told told = setting(tool.name);
-    if (take_row(tool.name, options_, tool)) {
-      tool.why_not = why_not_by_row(tool.name, *tool.X_FT, told, Pose::Identity());
-    } else if (told.X) {
-      tool.X_FT = *told.X;
-      tool.file = told.file.empty() ? program_.files[index_].name : told.file;
-      tool.line = told.line;
-    } else if (told.by_program) {
-      tool.why_not = told.why;
-    }
-    if (tool.X_FT) tool.rotation_rounding = from_deg(0.001);
-    return add_tool(std::move(tool));
-  }
 
   /// `UF : F` is the frame that is selected. Where another one is selected than the point has, the controller stops.
   std::size_t frame_of(const std::string& number_text, const std::string& selected) {
     const std::string why = why_not_there("UF", "UFRAME_NUM", number_text, selected);
-    if (why.empty()) return frame_of(number_text == "F" ? selected : number_text);
+    if (why.empty()) return add_frame(controller_.frame_of(number_text == "F" ? selected : number_text, options_));
     return add_frame({fmt::format("UFRAME[{}]", number_text), Pose::Identity(), why});
   }
   std::size_t tool_of(const std::string& number_text, const std::string& selected) {
     const std::string why = why_not_there("UT", "UTOOL_NUM", number_text, selected);
-    if (why.empty()) return tool_of(number_text == "F" ? selected : number_text);
+    if (why.empty())
+      return add_tool(
+          controller_.tool_of(number_text == "F" ? selected : number_text, options_, program_.files[index_].name));
     ProgramTool tool;
     tool.name = fmt::format("UTOOL[{}]", number_text);
     tool.why_not = why;
@@ -796,35 +375,6 @@ class File {
       used_.insert(begin);
     }
     if (!any) leave(statement, name, fmt::format("{} is not in /POS", name));
-  }
-
-  /// Groups beyond the first, and E1 to E3 of the first.
-  static void note_external(int group, const Group& values, ProgramTarget& target) {
-    for (int k = 1; k <= 6; ++k) {
-      const auto extended = values.values.find(fmt::format("E{}", k));
-      if (group == 1 && extended != values.values.end()) target.external[k - 1] = number(extended->second);
-      const auto joint = values.values.find(fmt::format("J{}", k));
-      if (group > 1 && joint != values.values.end()) target.external[6 * (group - 1) + k - 1] = number(joint->second);
-    }
-  }
-
-  /// `'N U T, 0, 0, 0'`: wrist not flipped, elbow up, toward the front; turns of joints 1, 4, 6.
-  static Configuration configuration_of(const std::string& text) {
-    Configuration said;
-    const std::size_t comma = text.find(',');
-    for (const char c : text.substr(0, comma)) {
-      if (c == 'N' || c == 'F') said.bends_down = c == 'N';
-      if (c == 'U' || c == 'D') said.elbow_up = c == 'U';
-      if (c == 'T' || c == 'B') said.behind_axis_1 = c == 'B';
-    }
-    said.turns.resize(6);
-    std::size_t at = comma;
-    for (const std::size_t joint : {std::size_t{0}, std::size_t{3}, std::size_t{5}}) {
-      if (at == std::string::npos) break;
-      said.turns[joint] = std::atoi(text.c_str() + at + 1);
-      at = text.find(',', at + 1);
-    }
-    return said;
   }
 
   std::size_t index_;

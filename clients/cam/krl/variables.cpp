@@ -51,6 +51,16 @@ bool is_motion(const std::string& word) {
   return kMotions.contains(word);
 }
 
+bool is_relative(const std::string& word) {
+  return word.ends_with("_REL") && is_motion(word.substr(0, word.size() - 4));
+}
+
+bool declares(const std::vector<Token>& tokens) {
+  static const std::set<std::string> kWords = {"DEF", "DEFFCT", "EXT", "EXTFCT"};
+  const std::size_t first = tokens.size() > 1 && tokens[0].text == "GLOBAL" ? 1 : 0;
+  return kWords.contains(tokens[first].text);
+}
+
 Variables::Variables(const std::vector<SourceFile>& files, const std::vector<std::vector<Line>>& lines)
     : files_(files), lines_(lines) {}
 

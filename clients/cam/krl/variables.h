@@ -23,6 +23,7 @@ using Told = tl::expected<T, std::string>;
 }
 
 constexpr std::array<const char*, 6> kPose = {"X", "Y", "Z", "A", "B", "C"};
+constexpr std::array<const char*, 6> kAxes = {"A1", "A2", "A3", "A4", "A5", "A6"};
 
 /// A value that a line gives to a name.
 struct Assigned {
@@ -43,6 +44,10 @@ struct Variable {
 /// stands; 0: the line is neither.
 [[nodiscard]] std::size_t done_later(const std::vector<Token>& tokens);
 [[nodiscard]] bool is_motion(const std::string& word);
+/// `LIN_REL`
+[[nodiscard]] bool is_relative(const std::string& word);
+/// `DEF shift(p:IN)`, `EXT shift(E6POS:IN)`
+[[nodiscard]] bool declares(const std::vector<Token>& tokens);
 
 class Variables {
  public:

@@ -12,6 +12,7 @@
 #include "clients/cam/nominal_targets.h"
 #include "clients/cam/scan.h"
 #include "clients/cam/sites.h"
+#include "clients/cam/urscript/values.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
 
@@ -19,37 +20,15 @@ namespace trammel::cam {
 
 namespace {
 
-template <typename T>
-using Told = tl::expected<T, std::string>;
-tl::unexpected<std::string> because(std::string why) { return tl::make_unexpected(std::move(why)); }
-
-constexpr int kDeepest = 20;
-
-/// Six numbers in brackets, a name, or a function of such.
-struct Value {
-  enum class Kind { kPose, kJoints, kName, kCall, kOther };
-  Kind kind = Kind::kOther;
-  std::size_t begin = 0, end = 0;
-  int line = 1;
-  std::string name;
-  std::string label = {};  ///< of an argument: `qnear=q`
-  std::vector<Piece> numbers;
-  std::vector<Value> arguments;
-};
-
-struct Variable {
-  Value value;
-  std::string changed;
-  /// Constants that it is set to one after the other, each until the next; empty: `value` is its only one.
-  std::vector<Value> in_order = {};
-  bool is_global = false, is_local = false;  ///< as any of its assignments says
-  std::set<std::size_t> functions = {};      ///< that set it, by the piece of their `def`
-  std::string set_again = {};                ///< where
-};
-
-/// Which of its constants a variable that is set in order has; kUndecided: another one on each way.
-using Settings = std::map<std::string, std::size_t>;
-constexpr std::size_t kUndecided = static_cast<std::size_t>(-1);
+using urscript::Assignment;
+using urscript::defines;
+using urscript::is_function_of_poses;
+using urscript::kUndecided;
+using urscript::numbers_in;
+using urscript::Settings;
+using urscript::Told;
+using urscript::Value;
+using urscript::Variable;
 
 /// What `set_payload` said.
 struct Load {
@@ -95,10 +74,6 @@ bool is_followed(const Piece& piece) {
   return kFollows.contains(piece.text);
 }
 
-bool is_function_of_poses(const std::string& name) {
-  return name == "pose_trans" || name == "pose_inv" || name == "pose_add";
-}
-
 class Script {
  public:
   Script(std::size_t index, Program& program, Sites& sites, const ReadOptions& options)
@@ -112,12 +87,6 @@ class Script {
   void read() {
     program_.mark_places.push_back({text_.starts_with("\xEF\xBB\xBF") ? std::size_t{3} : 0, "# "});
     const std::size_t tool = unknown_tool();
-    for (std::size_t at = 0; at < pieces_.size(); ++at) {
-      note_block(at);
-      note_assignment(at);
-    }
-    for (std::size_t at = 0; at < pieces_.size(); ++at) note_parameters(at);
-    for (auto& [name, variable] : variables_) find_order(variable);
     note_cuts();
     find_steps();
     Flow flow = flow_of(steps_);
@@ -132,14 +101,14 @@ class Script {
       if (is_motion(pieces_[at])) {
         tool_ = tool_carrying(states[s]);
         superposed_ = states[s].superposed;
-        now_ = &states[s].settings;
+        values_of_.assume(&states[s].settings);
         move_of_.emplace(s, program_.moves.size());
         motion(at);
       }
       if (pieces_[at].is("servoj") || pieces_[at].is("servoc") || pieces_[at].is("speedl"))
         leave(pieces_[at], std::string(pieces_[at].text), "it follows what is computed at run time");
     }
-    now_ = nullptr;
+    values_of_.assume(nullptr);
     note_order(flow);
     for (std::size_t at = 0; at < pieces_.size(); ++at) note_reading(at);
   }
@@ -163,8 +132,6 @@ class Script {
   }
 
  private:
-  static bool defines(const Piece& piece) { return piece.is("def") || piece.is("thread") || piece.is("sec"); }
-
   /// The words that decide the order, and the functions that move the robot or set something.
   void find_steps() {
     using Kind = Step::Kind;
@@ -176,7 +143,7 @@ class Script {
     for (std::size_t at = 0; at + 1 < pieces_.size(); ++at) {
       if (pieces_[at].is("def")) functions.emplace(pieces_[at + 1].text);
     }
-    auto next = assignments_.begin();
+    auto next = values_of_.assignments().begin();
     const auto add = [&](Step step, std::size_t at, const Assignment* assignment = nullptr) {
       steps_.push_back(std::move(step));
       step_at_.push_back(at);
@@ -184,8 +151,8 @@ class Script {
     };
     for (std::size_t at = 0; at < pieces_.size(); ++at) {
       // What an assignment calls comes before it.
-      for (; next != assignments_.end() && next->first <= at; ++next)
-        if (variables_.at(next->second.name).in_order.size() > 1) add({Kind::kPlain}, at, &next->second);
+      for (; next != values_of_.assignments().end() && next->first <= at; ++next)
+        if (values_of_.is_set_in_order(next->second.name)) add({Kind::kPlain}, at, &next->second);
       if (pieces_[at].kind != Piece::Kind::kWord) continue;
       const bool is_call = at + 1 < pieces_.size() && pieces_[at + 1].is("(");
       if (defines(pieces_[at]) && at + 1 < pieces_.size()) {
@@ -235,7 +202,7 @@ class Script {
       state.settings[assignment->name] = assignment->number;
       return;
     }
-    now_ = &state.settings;
+    values_of_.assume(&state.settings);
     if (at + 1 >= pieces_.size() || !pieces_[at + 1].is("(")) return;
     for (std::size_t k = 0; k < state.superposed.size(); ++k) {
       if (superposed()[k].begins.contains(pieces_[at].text)) state.superposed[k] = pieces_[at].line;
@@ -346,8 +313,8 @@ class Script {
   /// What else reads a target that is written anew: `b = hole`, `if hole[2] > 0.5:`.
   void note_reading(std::size_t at) {
     if (pieces_[at].kind != Piece::Kind::kWord) return;
-    const auto variable = variables_.find(std::string(pieces_[at].text));
-    if (variable == variables_.end() || !variable->second.changed.empty()) return;
+    const auto variable = values_of_.variables().find(std::string(pieces_[at].text));
+    if (variable == values_of_.variables().end() || !variable->second.changed.empty()) return;
     if (variable->second.in_order.empty()) return note_reading(at, variable->second.value);
     for (const Value& value : variable->second.in_order) note_reading(at, value);
   }
@@ -384,89 +351,6 @@ class Script {
     return program_.tools.size() - 1;
   }
 
-  /// The value from a piece on; `at` is set behind it.
-  Value value_at(std::size_t& at, int depth = 0) const {
-    Value value;
-    if (at >= pieces_.size() || depth > kDeepest) return value;
-    value.begin = pieces_[at].begin;
-    value.line = pieces_[at].line;
-    const bool pose = pieces_[at].is("p") && at + 1 < pieces_.size() && pieces_[at + 1].is("[");
-    if (pose || pieces_[at].is("[")) {
-      at += pose ? 2 : 1;
-      value.kind = pose ? Value::Kind::kPose : Value::Kind::kJoints;
-      bool is_number_due = true;
-      for (; at < pieces_.size() && !pieces_[at].is("]"); ++at) {
-        const bool is_number = pieces_[at].kind == Piece::Kind::kNumber;
-        if (is_number != is_number_due || (!is_number && !pieces_[at].is(","))) value.kind = Value::Kind::kOther;
-        if (is_number) value.numbers.push_back(pieces_[at]);
-        is_number_due = !is_number_due;
-      }
-      if (value.numbers.size() != 6) value.kind = Value::Kind::kOther;
-      if (at < pieces_.size()) ++at;
-    } else if (pieces_[at].kind == Piece::Kind::kWord) {
-      value.kind = Value::Kind::kName;
-      value.name = std::string(pieces_[at++].text);
-      if (at < pieces_.size() && pieces_[at].is("(")) {
-        value.kind = Value::Kind::kCall;
-        ++at;
-        while (at < pieces_.size() && !pieces_[at].is(")")) {
-          if (pieces_[at].is(",")) {
-            ++at;
-            continue;
-          }
-          const std::size_t before = at;
-          const bool labelled = at + 2 < pieces_.size() && pieces_[at].kind == Piece::Kind::kWord &&
-                                pieces_[at + 1].is("=") && !pieces_[at + 2].is("=");
-          if (labelled) at += 2;
-          value.arguments.push_back(value_at(at, depth + 1));
-          if (labelled) value.arguments.back().label = std::string(pieces_[before].text);
-          if (at == before) ++at;
-        }
-        if (at < pieces_.size()) ++at;
-      }
-    } else {
-      ++at;
-    }
-    value.end = at > 0 ? pieces_[at - 1].end : 0;
-    return value;
-  }
-
-  [[nodiscard]] bool ends_here(std::size_t at, int line) const {
-    return at >= pieces_.size() || pieces_[at].line != line || pieces_[at].is(",") || pieces_[at].is(")");
-  }
-
-  /// An assignment of a constant to a variable that has several.
-  struct Assignment {
-    std::string name;
-    std::size_t number = 0;
-  };
-
-  /// A variable that constants alone are assigned to has each of them until the next, if all its assignments mean one
-  /// variable: none is local, and they stand in one function or it is global.
-  static void find_order(Variable& variable) {
-    if (variable.in_order.size() < 2) return variable.in_order.clear();
-    const bool is_one = !variable.is_local && (variable.is_global || variable.functions.size() < 2);
-    const bool constant = std::all_of(variable.in_order.begin(), variable.in_order.end(), [](const Value& value) {
-      return value.kind == Value::Kind::kPose || value.kind == Value::Kind::kJoints;
-    });
-    if (variable.changed.empty() && is_one && constant) return;
-    if (variable.changed.empty()) variable.changed = variable.set_again;
-    variable.in_order.clear();
-  }
-
-  /// The blocks that are open at a piece, one after the other.
-  void note_block(std::size_t at) {
-    if (pieces_[at].kind != Piece::Kind::kWord) return;
-    if (defines(pieces_[at]) || pieces_[at].is("if") || pieces_[at].is("while")) open_.push_back(at);
-    if (pieces_[at].is("end") && !open_.empty()) open_.pop_back();
-  }
-  /// The piece of the `def` or `thread` that is open; one behind all of them: none is.
-  [[nodiscard]] std::size_t function_here() const {
-    const auto own =
-        std::find_if(open_.rbegin(), open_.rend(), [&](std::size_t block) { return defines(pieces_[block]); });
-    return own == open_.rend() ? pieces_.size() : *own;
-  }
-
   /// `set_gravity([0, 0, 9.82])`: away from the ground.
   void note_gravity(std::size_t at) {
     std::vector<double> up;
@@ -484,88 +368,9 @@ class Script {
                       pieces_[at].line));
   }
 
-  /// `global p1 = p[...]`; what is set in part is decided at run time.
-  void note_assignment(std::size_t at) {
-    if (pieces_[at].kind != Piece::Kind::kWord || at + 1 >= pieces_.size()) return;
-    const bool first = at == 0 || pieces_[at - 1].line != pieces_[at].line || pieces_[at - 1].is("global") ||
-                       pieces_[at - 1].is("local");
-    if (!first) return;
-    const std::string name(pieces_[at].text);
-    std::size_t equals = at + 1;
-    if (pieces_[equals].is("[")) {
-      while (equals < pieces_.size() && !pieces_[equals].is("=") && pieces_[equals].line == pieces_[at].line) ++equals;
-    }
-    if (equals + 1 >= pieces_.size() || !pieces_[equals].is("=") || pieces_[equals + 1].is("=")) return;
-    Variable& variable = variables_[name];
-    const bool again = variable.value.end > 0, in_part = equals != at + 1;
-    const std::string why =
-        fmt::format("{} is set at run time ({} line {})", shown(name), program_.files[index_].name, pieces_[at].line);
-    std::size_t next = equals + 1;
-    const Value value = value_at(next);
-    if (in_part) variable.changed = why;
-    if (again) variable.set_again = why;
-    variable.value = value;
-    if (next < pieces_.size() && pieces_[next].line == value.line && !ends_here(next, value.line))
-      variable.value.kind = Value::Kind::kOther;
-    variable.is_global |= at > 0 && pieces_[at - 1].is("global");
-    variable.is_local |= at > 0 && pieces_[at - 1].is("local");
-    variable.functions.insert(function_here());
-    assignments_.emplace(next, Assignment{name, variable.in_order.size()});
-    variable.in_order.push_back(variable.value);
-  }
-
-  /// `def drill(hole, depth=0.01):` hides what is called so elsewhere.
-  void note_parameters(std::size_t at) {
-    if (!pieces_[at].is("def") || at + 2 >= pieces_.size() || !pieces_[at + 2].is("(")) return;
-    for (std::size_t next = at + 3; next < pieces_.size() && !pieces_[next].is(")"); ++next) {
-      const bool begins = pieces_[next - 1].is("(") || pieces_[next - 1].is(",");
-      if (!begins || pieces_[next].kind != Piece::Kind::kWord) continue;
-      variables_[std::string(pieces_[next].text)].changed =
-          fmt::format("{} is a parameter of {} ({} line {})", shown(std::string(pieces_[next].text)),
-                      shown(std::string(pieces_[at + 1].text)), program_.files[index_].name, pieces_[at].line);
-    }
-  }
-
-  /// `stored`: it was made before, when a variable may have been another one.
-  Told<Value> resolved(const Value& value, bool stored = false) const {
-    Value now = value;
-    for (int depth = 0; now.kind == Value::Kind::kName && depth < kDeepest; ++depth) {
-      const auto variable = variables_.find(now.name);
-      if (variable == variables_.end()) return because(fmt::format("{} is not in the script", shown(now.name)));
-      if (!variable->second.changed.empty()) return because(variable->second.changed);
-      if (variable->second.in_order.empty()) {
-        now = variable->second.value;
-        continue;
-      }
-      const auto set = now_ == nullptr ? Settings::const_iterator() : now_->find(now.name);
-      const bool decided = now_ != nullptr && set != now_->end() && set->second != kUndecided;
-      if (!decided || stored || depth > 0) return because(variable->second.set_again);
-      now = variable->second.in_order[set->second];
-    }
-    return now;
-  }
-
-  Told<Pose> pose_of_value(const Value& value, int depth, bool stored = false) const {
-    const Told<Value> now = resolved(value, stored);
-    const bool inner = stored || value.kind == Value::Kind::kName;
-    if (!now) return because(now.error());
-    if (now->kind == Value::Kind::kPose) return pose_of(Coordinates::kRotationVector, numbers_in(*now));
-    if (now->kind != Value::Kind::kCall) return because("it is not constant");
-    const std::size_t due = now->name == "pose_inv" ? 1 : 2;
-    if (!is_function_of_poses(now->name) || now->arguments.size() != due || depth > kDeepest)
-      return because(fmt::format("the function {} decides it", shown(now->name)));
-    const Told<Pose> left = pose_of_value(now->arguments[0], depth + 1, inner);
-    if (!left) return left;
-    if (due == 1) return left->inverse();
-    const Told<Pose> right = pose_of_value(now->arguments[1], depth + 1, inner);
-    if (!right) return right;
-    if (now->name == "pose_trans") return *left * *right;
-    return make_pose(left->linear() * right->linear(), left->translation() + right->translation());
-  }
-
   std::size_t tool_set(std::size_t at) {
     std::size_t next = at + 2;
-    const Told<Pose> X_FT = pose_of_value(value_at(next), 0);
+    const Told<Pose> X_FT = values_of_.pose_of_value(values_of_.value_at(next), 0);
     ProgramTool tool;
     tool.name = "tcp";
     tool.file = program_.files[index_].name;
@@ -592,12 +397,12 @@ class Script {
     std::size_t next = at + 2;
     const int count = pieces_[at].is("movec") ? 2 : 1;
     for (int k = 0; k < count; ++k) {
-      Value value = value_at(next);
+      Value value = values_of_.value_at(next);
       // The joints of a pose are those of the pose.
       std::string why;
       if (value.kind == Value::Kind::kCall && value.name == "get_inverse_kin" && !value.arguments.empty())
         why = take_inverse(value, move);
-      else if (!ends_here(next, pieces_[at].line) && next < pieces_.size() && !pieces_[next].is(","))
+      else if (!values_of_.ends_here(next, pieces_[at].line) && next < pieces_.size() && !pieces_[next].is(","))
         value.kind = Value::Kind::kOther;
       for (std::size_t s = 0; s < superposed_.size(); ++s) {
         if (superposed_[s] != 0) why = fmt::format("{} (line {})", superposed()[s].why, superposed_[s]);
@@ -621,18 +426,12 @@ class Script {
       if (argument.label == "tcp" || (argument.label.empty() && k == 4)) return "get_inverse_kin is given another tool";
       if (argument.label != "qnear" && (!argument.label.empty() || k > 1)) continue;
       if (argument.kind == Value::Kind::kCall && argument.name == "get_actual_joint_positions") continue;
-      const Told<Value> near = resolved(argument);
+      const Told<Value> near = values_of_.resolved(argument);
       if (!near) return near.error();
       if (near->kind != Value::Kind::kJoints) return "the joints that it is to be near to are not constant";
       if (move.choice == JointChoice::kNearest) move.near = numbers_in(*near);
     }
     return "";
-  }
-
-  static std::vector<double> numbers_in(const Value& value) {
-    std::vector<double> numbers;
-    for (const Piece& piece : value.numbers) numbers.push_back(read_number(piece.text).value_or(WrittenNumber{}).value);
-    return numbers;
   }
 
   /// `v=0.1`, or the second number behind the target, m/s, of a motion of the tool.
@@ -651,7 +450,7 @@ class Script {
 
   void use(std::size_t at, const Value& value) {
     const std::string name = text_.substr(value.begin, value.end - value.begin);
-    const Told<Value> now = resolved(value);
+    const Told<Value> now = values_of_.resolved(value);
     if (!now) return leave(pieces_[at], name, now.error());
     const bool readable = now->kind == Value::Kind::kPose || now->kind == Value::Kind::kJoints ||
                           (now->kind == Value::Kind::kCall && is_function_of_poses(now->name));
@@ -661,7 +460,7 @@ class Script {
                                                    : std::string("an expression decides it"));
     }
     values_[now->begin] = *now;
-    if (now->kind == Value::Kind::kCall) poses_.insert_or_assign(now->begin, pose_of_value(value, 0));
+    if (now->kind == Value::Kind::kCall) poses_.insert_or_assign(now->begin, values_of_.pose_of_value(value, 0));
     if (now->kind == Value::Kind::kJoints)
       program_.moves.back().axes = in_degrees(Coordinates::kJointRadians, numbers_in(*now));
     sites_.add(index_, now->begin, name,
@@ -704,6 +503,7 @@ class Script {
   const ReadOptions& options_;
   const std::string& text_;
   std::vector<Piece> pieces_;
+  urscript::Values values_of_{pieces_, program_.files[index_].name};
   std::vector<Step> steps_;
   std::vector<std::size_t> step_at_;  ///< the piece of each
   std::vector<Load> loads_ = std::vector<Load>(1);
@@ -712,11 +512,7 @@ class Script {
   std::size_t tool_ = 0;                        ///< of the motion that is read
   std::array<int, 3> superposed_{};             ///< the same
   std::map<std::size_t, std::size_t> move_of_;  ///< of Program::moves, by the step
-  std::map<std::string, Variable> variables_;
-  std::vector<std::size_t> open_;                       ///< pieces that open blocks, while assignments are noted
-  std::multimap<std::size_t, Assignment> assignments_;  ///< by the piece behind them
-  std::vector<const Assignment*> sets_;                 ///< of each step; nullptr: it is no such one
-  const Settings* now_ = nullptr;                       ///< what holds where something is asked for
+  std::vector<const Assignment*> sets_;         ///< of each step; nullptr: it is no such one
   std::map<std::size_t, Value> values_;
   std::map<std::size_t, Told<Pose>> poses_;  ///< of values that functions make
 };

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "clients/cam/fanuc/statements.h"
+#include "clients/cam/fanuc/system_frames.h"
+#include "clients/cam/program.h"
+
+/// What all programs of a FANUC controller share.
+namespace trammel::cam::fanuc {
+
+/// PR[m] as far as the program sets it: by elements.
+struct Register {
+  std::array<std::optional<double>, 6> elements;
+  std::string changed;  ///< why it is not constant
+};
+
+/// `UFRAME[1]=PR[5]`
+struct Setting {
+  std::string from, where;
+  std::size_t file = 0;
+  std::string changed = {};  ///< why its value is not constant
+};
+
+/// What the programs set UFRAME[n] or UTOOL[n] to, or why that is not known.
+struct Told {
+  std::optional<Pose> X;
+  std::string why;
+  bool by_program = false;  ///< the programs decide the value, known or not
+  std::string where;
+  std::string file = {};
+  int line = 0;
+};
+
+/// What all programs of a controller share.
+struct Controller {
+  std::map<std::string, Register> registers;
+  std::map<std::string, Setting> settings;  ///< of UFRAME[n] and UTOOL[n]
+  struct Statements {
+    std::string first;  ///< where
+    int count = 0;
+  };
+  std::map<std::string, Statements> loads;    ///< of PAYLOAD[n]
+  std::map<std::string, SystemFrame> system;  ///< UFRAME[n] and UTOOL[n] of the system variables
+  std::map<std::string, std::string> taken;   ///< those of them that targets have, with the file
+  std::set<std::string> programs;             ///< that are read, by name
+
+  /// `PR[5,1]=100`, `PR[5]=LPOS`, of the file of that number.
+  void note_register(const Pieces& statement, std::size_t equals, const std::string& name, const std::string& where,
+                     std::size_t file);
+  /// A frame or tool by its number.
+  [[nodiscard]] ProgramFrame frame_of(const std::string& number_text, const ReadOptions& options);
+  /// `file`: of the program that has it.
+  [[nodiscard]] ProgramTool tool_of(const std::string& number_text, const ReadOptions& options,
+                                    const std::string& file);
+
+ private:
+  [[nodiscard]] const Setting* setting_of(const std::string& name) const;
+  [[nodiscard]] const Register* register_of(const std::string& name) const;
+  [[nodiscard]] Told setting(const std::string& name);
+  [[nodiscard]] Told by_system(const std::string& name);
+};
+
+}  // namespace trammel::cam::fanuc

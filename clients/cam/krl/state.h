@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "clients/cam/krl/tools.h"
+#include "clients/cam/krl/variables.h"
+
+/// What lines of a KRL program set for the motions behind them.
+namespace trammel::cam::krl {
+
+constexpr double kSpeedUnknown = -1;
+
+/// What the controller has set when a motion comes.
+struct State {
+  std::size_t tool = 0, frame = 0;
+  std::size_t load = 0;          ///< 0: the tool's own
+  std::string fixed_tool;        ///< why the robot does not hold the tool; empty: it does
+  std::string sensed;            ///< why a sensor moves the path; empty: none does
+  std::uint64_t armed = 0;       ///< interrupts that are declared, a bit each
+  double speed = kSpeedUnknown;  ///< of the tool, mm/s
+  auto operator<=>(const State&) const = default;
+};
+
+class Setting {
+ public:
+  Setting(const std::vector<std::vector<Line>>& lines, const Variables& names, Tools& tools, Program& program)
+      : lines_(lines), names_(names), tools_(tools), program_(program) {}
+
+  /// What a line sets by itself.
+  void set(std::size_t f, std::size_t k, State& state);
+  /// Where ways come together, what they set differently is not known.
+  void join(State& state, const State& other, const std::string& by);
+  /// `WITH $TOOL = STOOL2(FP1), $BASE = SBASE(FP1.BASE_NO)`: for this motion, or for those of a spline, alone.
+  void apply_with(std::size_t f, std::size_t k, State& state);
+  /// Whether lines set tool or base for more than one motion.
+  [[nodiscard]] bool by_hand() const { return sets_by_hand_; }
+
+ private:
+  void apply_fdat(const std::string& name, std::size_t f, State& state);
+  void set_sensor(const std::vector<Token>& tokens, std::size_t f, std::size_t k, State& state) const;
+  static double speed_at(const std::vector<Token>& tokens, std::size_t at);
+  static double speed_of(const std::vector<Token>& tokens, std::size_t at);
+  void set_by_bas(const std::vector<Token>& tokens, std::size_t f, std::size_t k, State& state);
+  static std::string why_fixed(const std::vector<Token>& tokens, std::size_t at);
+  [[nodiscard]] std::string carried_at(std::size_t f, std::size_t k) const;
+  void set_with(std::size_t f, std::size_t k, std::size_t at, bool assigns, State& state);
+
+  const std::vector<std::vector<Line>>& lines_;
+  const Variables& names_;
+  Tools& tools_;
+  Program& program_;
+  bool sets_by_hand_ = false;
+};
+
+}  // namespace trammel::cam::krl

@@ -1,0 +1,111 @@
+#include "clients/cam/krl/stated.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "server/base/units.h"
+
+namespace trammel::cam::krl {
+
+namespace {
+
+class Stated {
+ public:
+  Stated(const std::vector<std::vector<Line>>& lines, const ReadOptions& options, Variables& names, Program& program)
+      : lines_(lines), options_(options), names_(names), program_(program) {}
+
+  void read() {
+    for (std::size_t f = 0; f < lines_.size(); ++f) {
+      for (std::size_t k = 0; k < lines_[f].size(); ++k) note_robot(f, k);
+    }
+    find_base();
+    find_numbers();
+  }
+
+ private:
+  /// Each value that a variable of the controller is given in the files.
+  template <typename Work>
+  void at_each(const std::string& name, const Work& work) const {
+    for (const auto& [key, variable] : names_.all()) {
+      if (key.second != name) continue;
+      for (const Assigned& at : variable.values) {
+        if (at.operands.size() == 1) work(at, at.operands[0]);
+      }
+    }
+  }
+
+  void find_base() {
+    if (!on_rail_.empty()) {
+      program_.notes.push_back(
+          fmt::format("an external axis carries the robot ({}): $ROBROOT moves and is not used", on_rail_));
+      return;
+    }
+    at_each("$ROBROOT", [&](const Assigned& at, const Value&) {
+      const Told<Pose> X_WB = names_.frame_of(at.operands, at.file);
+      if (X_WB) program_.bases.push_back({*X_WB, "$ROBROOT", program_.files[at.file].name, line_at(at)});
+    });
+    if (const auto row = options_.frames.find(kRobotBase); row != options_.frames.end())
+      names_.set_robroot(row->second);
+    else if (!program_.bases.empty())
+      names_.set_robroot(program_.bases.front().X_WB);
+  }
+
+  void find_numbers() {
+    const auto add = [&](ArmNumber of, const char* name, const auto& value_of) {
+      at_each(name, [&](const Assigned& at, const Value& value) {
+        if (const std::optional<double> number = value_of(at, value))
+          program_.numbers.push_back({of, *number, name, program_.files[at.file].name, line_at(at)});
+      });
+    };
+    const auto count = [](const Assigned&, const Value& value) -> std::optional<double> {
+      return value.kind == Value::Kind::kNumber ? std::optional<double>(value.number) : std::nullopt;
+    };
+    const auto length = [](const Assigned&, const Value& value) -> std::optional<double> {
+      // Arms of other kinds have zeros there.
+      const bool said = value.kind == Value::Kind::kNumber && value.number != 0;
+      return said ? std::optional<double>(from_mm(value.number)) : std::nullopt;
+    };
+    const auto along = [&](const Assigned& at, const Value&) -> std::optional<double> {
+      const Told<Pose> X = names_.frame_of(at.operands, at.file);
+      const bool said = X && !X->translation().isZero();
+      return said ? std::optional<double>(X->translation().norm()) : std::nullopt;
+    };
+    add(ArmNumber::kAxes, "$NUM_AX", count);
+    add(ArmNumber::kHeightOfAxis2, "$TIRORO", along);
+    add(ArmNumber::kAxis1ToAxis2, "$LENGTH_A", length);
+    add(ArmNumber::kAxis2ToAxis3, "$LENGTH_B", length);
+    add(ArmNumber::kAxis3ToWrist, "$TX3P3", along);
+    add(ArmNumber::kWristToFlange, "$TFLWP", along);
+  }
+
+  /// `$TRAFONAME[]="#KR210R2700 EXTRA C4 FLR"`, `DECL EX_KIN $EX_KIN={ET1 #ERSYS,...}`
+  void note_robot(std::size_t f, std::size_t k) {
+    const std::vector<Token>& tokens = lines_[f][k].tokens;
+    const auto has = [&](const char* word) {
+      return std::any_of(tokens.begin(), tokens.end(), [&](const Token& token) { return token.text == word; });
+    };
+    if (has("$EX_KIN") && has("ERSYS")) on_rail_ = names_.place(f, k);
+    if (tokens.size() < 3 || tokens[0].text != "$TRAFONAME" || tokens.back().kind != TokenKind::kText) return;
+    const std::string& text = tokens.back().text;
+    program_.types.push_back(
+        {text.substr(1, text.size() - 2), "$TRAFONAME", program_.files[f].name, lines_[f][k].number});
+  }
+
+  [[nodiscard]] int line_at(const Assigned& at) const { return lines_[at.file][at.line].number; }
+
+  const std::vector<std::vector<Line>>& lines_;
+  const ReadOptions& options_;
+  Variables& names_;
+  Program& program_;
+  std::string on_rail_;  ///< where an external axis is said to carry the robot; empty: nowhere
+};
+
+}  // namespace
+
+void read_stated(const std::vector<std::vector<Line>>& lines, const ReadOptions& options, Variables& names,
+                 Program& program) {
+  Stated(lines, options, names, program).read();
+}
+
+}  // namespace trammel::cam::krl

@@ -1,0 +1,133 @@
+#include "clients/cam/rapid/targets.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "clients/cam/number_text.h"
+#include "server/base/units.h"
+
+namespace trammel::cam::rapid {
+
+namespace {
+
+using Kind = Expression::Kind;
+
+}  // namespace
+
+Told<void> Targets::read_joints(const Data& data, ProgramTarget& target) {
+  target.coordinates = Coordinates::kJoints;
+  if (options_.keep_joints) return because("joint targets are kept (--keep-joints)");
+  const Told<JointValue> value = meaning_.joints_of(*data.node, *data.scope);
+  if (!value) return because(value.error());
+  target.numbers = value->axes;
+  note_external(value->external, target);
+  rewrite(data.node->parts[0], *data.scope, 0, 6, value->decimals, target);
+  return {};
+}
+
+Told<void> Targets::read_target(const Data& data, const std::vector<const Use*>& uses, const Data* place,
+                                ProgramTarget& target) const {
+  const Told<TargetValue> value = meaning_.target_of(*data.node, *data.scope);
+  if (!value) return because(value.error());
+  // The same bytes reached through different callers must mean the same.
+  for (const Use* use : uses) {
+    if (use->data.node == data.node && use->data.scope == data.scope) continue;
+    const Told<TargetValue> other = meaning_.target_of(*use->data.node, *use->data.scope);
+    if (!other) return because(other.error());
+    if (other->numbers != value->numbers) return because("its callers hand over different values");
+  }
+  target.coordinates = Coordinates::kQuaternion;
+  target.numbers = value->numbers;
+  note_external(value->external, target);
+  target.configuration = configuration_of(value->conf);
+  const Data& where = place != nullptr ? *place : data;
+  const bool in_place = where.node->kind == Kind::kAggregate && where.node->parts.size() == 4;
+  if (in_place) {
+    rewrite(where.node->parts[0], *where.scope, 0, 3, value->decimals, target);
+    rewrite(where.node->parts[1], *where.scope, 3, 4, value->rotation_decimals, target);
+  } else {
+    rewrite_whole(*where.node, *value, target);
+  }
+  return {};
+}
+
+/// The line above the statement that keeps what was folded.
+void Targets::note_original(const Site& site, const Data& place, ProgramTarget& target) const {
+  const std::string& text = program_.files[site.module].text;
+  target.comment_at = line_begin(text, site.statement);
+  const std::size_t indent = text.find_first_not_of(" \t", target.comment_at);
+  std::string original = meaning_.text_of(*place.node, *place.scope);
+  target.comment = text.substr(target.comment_at, indent - target.comment_at) + "! trammel: was " + original;
+}
+
+void Targets::note_external(const std::array<double, 6>& external, ProgramTarget& target) {
+  for (int k = 0; k < 6; ++k) {
+    if (std::abs(external[static_cast<std::size_t>(k)]) < kNoAxis)
+      target.external[k] = external[static_cast<std::size_t>(k)];
+  }
+}
+
+/// cf1, cf4, cf6: quarter turns of joints 1, 4, 6; cfx: the branch.
+Configuration Targets::configuration_of(const std::array<double, 4>& conf) {
+  Configuration configuration;
+  const double branch = conf[3];
+  if (branch >= 0 && branch <= 7 && branch == std::floor(branch)) configuration.conf = static_cast<int>(branch);
+  configuration.near.resize(6);
+  constexpr std::array<std::size_t, 3> kJoints = {0, 3, 5};
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (std::abs(conf[k]) < 100) configuration.near[kJoints[k]] = (conf[k] + 0.5) * kPi / 2;
+  }
+  return configuration;
+}
+
+/// `count` numbers from `first` on are written where the expression stands.
+void Targets::rewrite(const Expression& expression, const Scope& scope, std::size_t first, std::size_t count,
+                      int decimals, ProgramTarget& target) const {
+  const std::string& text = program_.files[scope.module].text;
+  if (expression.kind == Kind::kAggregate && expression.parts.size() == count) {
+    for (std::size_t k = 0; k < count; ++k) {
+      const Expression& part = expression.parts[k];
+      const auto written = part.kind == Kind::kNumber
+                               ? read_number(std::string_view(text).substr(part.begin, part.end - part.begin))
+                               : std::nullopt;
+      NumberStyle style;
+      style.decimals = decimals;
+      if (!written) target.folded = true;
+      target.rewrites.push_back({{part.begin, part.end}, {}, {{first + k, written ? written->style : style}}});
+    }
+    return;
+  }
+  target.folded = true;
+  Rewrite whole{{expression.begin, expression.end}, {"["}, {}};
+  add_numbers(first, count, decimals, whole);
+  whole.texts.back() += "]";
+  target.rewrites.push_back(std::move(whole));
+}
+
+/// Adds numbers with commas between.
+void Targets::add_numbers(std::size_t first, std::size_t count, int decimals, Rewrite& whole) {
+  for (std::size_t k = 0; k < count; ++k) {
+    NumberStyle style;
+    style.decimals = decimals;
+    whole.slots.push_back({first + k, style});
+    whole.texts.emplace_back(k + 1 < count ? "," : "");
+  }
+}
+
+void Targets::rewrite_whole(const Expression& expression, const TargetValue& value, ProgramTarget& target) {
+  target.folded = true;
+  Rewrite whole{{expression.begin, expression.end}, {"[["}, {}};
+  add_numbers(0, 3, value.decimals, whole);
+  whole.texts.back() += "],[";
+  add_numbers(3, 4, std::max(value.rotation_decimals, 6), whole);
+  std::vector<std::string> external;
+  for (const double axis : value.external)
+    external.push_back(std::abs(axis) >= kNoAxis ? "9E+09" : fmt::format("{}", axis));
+  whole.texts.back() += fmt::format("],[{}],[{}]]", fmt::join(value.conf, ","), fmt::join(external, ","));
+  target.rewrites.push_back(std::move(whole));
+}
+
+}  // namespace trammel::cam::rapid

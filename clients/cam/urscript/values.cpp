@@ -1,0 +1,194 @@
+#include "clients/cam/urscript/values.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "clients/cam/number_text.h"
+#include "server/base/plain_text.h"
+
+namespace trammel::cam::urscript {
+
+namespace {
+
+constexpr int kDeepest = 20;
+
+}  // namespace
+
+bool is_function_of_poses(const std::string& name) {
+  return name == "pose_trans" || name == "pose_inv" || name == "pose_add";
+}
+
+bool defines(const Piece& piece) { return piece.is("def") || piece.is("thread") || piece.is("sec"); }
+
+std::vector<double> numbers_in(const Value& value) {
+  std::vector<double> numbers;
+  for (const Piece& piece : value.numbers) numbers.push_back(read_number(piece.text).value_or(WrittenNumber{}).value);
+  return numbers;
+}
+
+Values::Values(const std::vector<Piece>& pieces, std::string file) : pieces_(pieces), file_(std::move(file)) {
+  for (std::size_t at = 0; at < pieces_.size(); ++at) {
+    note_block(at);
+    note_assignment(at);
+  }
+  for (std::size_t at = 0; at < pieces_.size(); ++at) note_parameters(at);
+  for (auto& [name, variable] : variables_) find_order(variable);
+}
+
+/// The blocks that are open at a piece, one after the other.
+void Values::note_block(std::size_t at) {
+  if (pieces_[at].kind != Piece::Kind::kWord) return;
+  if (defines(pieces_[at]) || pieces_[at].is("if") || pieces_[at].is("while")) open_.push_back(at);
+  if (pieces_[at].is("end") && !open_.empty()) open_.pop_back();
+}
+
+/// The piece of the `def` or `thread` that is open; one behind all of them: none is.
+std::size_t Values::function_here() const {
+  const auto own =
+      std::find_if(open_.rbegin(), open_.rend(), [&](std::size_t block) { return defines(pieces_[block]); });
+  return own == open_.rend() ? pieces_.size() : *own;
+}
+
+/// `global p1 = p[...]`; what is set in part is decided at run time.
+void Values::note_assignment(std::size_t at) {
+  if (pieces_[at].kind != Piece::Kind::kWord || at + 1 >= pieces_.size()) return;
+  const bool first = at == 0 || pieces_[at - 1].line != pieces_[at].line || pieces_[at - 1].is("global") ||
+                     pieces_[at - 1].is("local");
+  if (!first) return;
+  const std::string name(pieces_[at].text);
+  std::size_t equals = at + 1;
+  if (pieces_[equals].is("[")) {
+    while (equals < pieces_.size() && !pieces_[equals].is("=") && pieces_[equals].line == pieces_[at].line) ++equals;
+  }
+  if (equals + 1 >= pieces_.size() || !pieces_[equals].is("=") || pieces_[equals + 1].is("=")) return;
+  Variable& variable = variables_[name];
+  const bool again = variable.value.end > 0, in_part = equals != at + 1;
+  const std::string why = fmt::format("{} is set at run time ({} line {})", shown(name), file_, pieces_[at].line);
+  std::size_t next = equals + 1;
+  const Value value = value_at(next);
+  if (in_part) variable.changed = why;
+  if (again) variable.set_again = why;
+  variable.value = value;
+  if (next < pieces_.size() && pieces_[next].line == value.line && !ends_here(next, value.line))
+    variable.value.kind = Value::Kind::kOther;
+  variable.is_global |= at > 0 && pieces_[at - 1].is("global");
+  variable.is_local |= at > 0 && pieces_[at - 1].is("local");
+  variable.functions.insert(function_here());
+  assignments_.emplace(next, Assignment{name, variable.in_order.size()});
+  variable.in_order.push_back(variable.value);
+}
+
+/// `def drill(hole, depth=0.01):` hides what is called so elsewhere.
+void Values::note_parameters(std::size_t at) {
+  if (!pieces_[at].is("def") || at + 2 >= pieces_.size() || !pieces_[at + 2].is("(")) return;
+  for (std::size_t next = at + 3; next < pieces_.size() && !pieces_[next].is(")"); ++next) {
+    const bool begins = pieces_[next - 1].is("(") || pieces_[next - 1].is(",");
+    if (!begins || pieces_[next].kind != Piece::Kind::kWord) continue;
+    variables_[std::string(pieces_[next].text)].changed =
+        fmt::format("{} is a parameter of {} ({} line {})", shown(std::string(pieces_[next].text)),
+                    shown(std::string(pieces_[at + 1].text)), file_, pieces_[at].line);
+  }
+}
+
+/// A variable that constants alone are assigned to has each of them until the next, if all its assignments mean one
+/// variable: none is local, and they stand in one function or it is global.
+void Values::find_order(Variable& variable) {
+  if (variable.in_order.size() < 2) return variable.in_order.clear();
+  const bool is_one = !variable.is_local && (variable.is_global || variable.functions.size() < 2);
+  const bool constant = std::all_of(variable.in_order.begin(), variable.in_order.end(), [](const Value& value) {
+    return value.kind == Value::Kind::kPose || value.kind == Value::Kind::kJoints;
+  });
+  if (variable.changed.empty() && is_one && constant) return;
+  if (variable.changed.empty()) variable.changed = variable.set_again;
+  variable.in_order.clear();
+}
+
+Value Values::value_at(std::size_t& at, int depth) const {
+  Value value;
+  if (at >= pieces_.size() || depth > kDeepest) return value;
+  value.begin = pieces_[at].begin;
+  value.line = pieces_[at].line;
+  const bool pose = pieces_[at].is("p") && at + 1 < pieces_.size() && pieces_[at + 1].is("[");
+  if (pose || pieces_[at].is("[")) {
+    at += pose ? 2 : 1;
+    value.kind = pose ? Value::Kind::kPose : Value::Kind::kJoints;
+    bool is_number_due = true;
+    for (; at < pieces_.size() && !pieces_[at].is("]"); ++at) {
+      const bool is_number = pieces_[at].kind == Piece::Kind::kNumber;
+      if (is_number != is_number_due || (!is_number && !pieces_[at].is(","))) value.kind = Value::Kind::kOther;
+      if (is_number) value.numbers.push_back(pieces_[at]);
+      is_number_due = !is_number_due;
+    }
+    if (value.numbers.size() != 6) value.kind = Value::Kind::kOther;
+    if (at < pieces_.size()) ++at;
+  } else if (pieces_[at].kind == Piece::Kind::kWord) {
+    value.kind = Value::Kind::kName;
+    value.name = std::string(pieces_[at++].text);
+    if (at < pieces_.size() && pieces_[at].is("(")) {
+      value.kind = Value::Kind::kCall;
+      ++at;
+      while (at < pieces_.size() && !pieces_[at].is(")")) {
+        if (pieces_[at].is(",")) {
+          ++at;
+          continue;
+        }
+        const std::size_t before = at;
+        const bool labelled = at + 2 < pieces_.size() && pieces_[at].kind == Piece::Kind::kWord &&
+                              pieces_[at + 1].is("=") && !pieces_[at + 2].is("=");
+        if (labelled) at += 2;
+        value.arguments.push_back(value_at(at, depth + 1));
+        if (labelled) value.arguments.back().label = std::string(pieces_[before].text);
+        if (at == before) ++at;
+      }
+      if (at < pieces_.size()) ++at;
+    }
+  } else {
+    ++at;
+  }
+  value.end = at > 0 ? pieces_[at - 1].end : 0;
+  return value;
+}
+
+bool Values::ends_here(std::size_t at, int line) const {
+  return at >= pieces_.size() || pieces_[at].line != line || pieces_[at].is(",") || pieces_[at].is(")");
+}
+
+Told<Value> Values::resolved(const Value& value, bool stored) const {
+  Value now = value;
+  for (int depth = 0; now.kind == Value::Kind::kName && depth < kDeepest; ++depth) {
+    const auto variable = variables_.find(now.name);
+    if (variable == variables_.end()) return because(fmt::format("{} is not in the script", shown(now.name)));
+    if (!variable->second.changed.empty()) return because(variable->second.changed);
+    if (variable->second.in_order.empty()) {
+      now = variable->second.value;
+      continue;
+    }
+    const auto set = now_ == nullptr ? Settings::const_iterator() : now_->find(now.name);
+    const bool decided = now_ != nullptr && set != now_->end() && set->second != kUndecided;
+    if (!decided || stored || depth > 0) return because(variable->second.set_again);
+    now = variable->second.in_order[set->second];
+  }
+  return now;
+}
+
+Told<Pose> Values::pose_of_value(const Value& value, int depth, bool stored) const {
+  const Told<Value> now = resolved(value, stored);
+  const bool inner = stored || value.kind == Value::Kind::kName;
+  if (!now) return because(now.error());
+  if (now->kind == Value::Kind::kPose) return pose_of(Coordinates::kRotationVector, numbers_in(*now));
+  if (now->kind != Value::Kind::kCall) return because("it is not constant");
+  const std::size_t due = now->name == "pose_inv" ? 1 : 2;
+  if (!is_function_of_poses(now->name) || now->arguments.size() != due || depth > kDeepest)
+    return because(fmt::format("the function {} decides it", shown(now->name)));
+  const Told<Pose> left = pose_of_value(now->arguments[0], depth + 1, inner);
+  if (!left) return left;
+  if (due == 1) return left->inverse();
+  const Told<Pose> right = pose_of_value(now->arguments[1], depth + 1, inner);
+  if (!right) return right;
+  if (now->name == "pose_trans") return *left * *right;
+  return make_pose(left->linear() * right->linear(), left->translation() + right->translation());
+}
+
+}  // namespace trammel::cam::urscript

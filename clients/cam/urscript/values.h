@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <set>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "clients/cam/program.h"
+#include "clients/cam/scan.h"
+
+/// What the expressions of a script mean, as far as they are constant.
+namespace trammel::cam::urscript {
+
+template <typename T>
+using Told = tl::expected<T, std::string>;
+[[nodiscard]] inline tl::unexpected<std::string> because(std::string why) {
+  return tl::make_unexpected(std::move(why));
+}
+
+/// Six numbers in brackets, a name, or a function of such.
+struct Value {
+  enum class Kind { kPose, kJoints, kName, kCall, kOther };
+  Kind kind = Kind::kOther;
+  std::size_t begin = 0, end = 0;
+  int line = 1;
+  std::string name;
+  std::string label = {};  ///< of an argument: `qnear=q`
+  std::vector<Piece> numbers;
+  std::vector<Value> arguments;
+};
+
+struct Variable {
+  Value value;
+  std::string changed;
+  /// Constants that it is set to one after the other, each until the next; empty: `value` is its only one.
+  std::vector<Value> in_order = {};
+  bool is_global = false, is_local = false;  ///< as any of its assignments says
+  std::set<std::size_t> functions = {};      ///< that set it, by the piece of their `def`
+  std::string set_again = {};                ///< where
+};
+
+/// Which of its constants a variable that is set in order has; kUndecided: another one on each way.
+using Settings = std::map<std::string, std::size_t>;
+constexpr std::size_t kUndecided = static_cast<std::size_t>(-1);
+
+/// An assignment of a constant to a variable that has several.
+struct Assignment {
+  std::string name;
+  std::size_t number = 0;
+};
+
+/// `pose_trans`, `pose_inv`, `pose_add`
+[[nodiscard]] bool is_function_of_poses(const std::string& name);
+/// `def`, `thread`
+[[nodiscard]] bool defines(const Piece& piece);
+/// Of six in brackets.
+[[nodiscard]] std::vector<double> numbers_in(const Value& value);
+
+class Values {
+ public:
+  /// Of the pieces of a script, which is called `file` in reasons. Finds what its variables are set to.
+  Values(const std::vector<Piece>& pieces, std::string file);
+
+  /// The value from a piece on; `at` is set behind it.
+  [[nodiscard]] Value value_at(std::size_t& at, int depth = 0) const;
+  [[nodiscard]] bool ends_here(std::size_t at, int line) const;
+  /// `stored`: it was made before, when a variable may have been another one.
+  [[nodiscard]] Told<Value> resolved(const Value& value, bool stored = false) const;
+  [[nodiscard]] Told<Pose> pose_of_value(const Value& value, int depth, bool stored = false) const;
+  /// What holds for the expressions that are asked for next; nullptr: not known.
+  void assume(const Settings* settings) { now_ = settings; }
+  [[nodiscard]] const std::map<std::string, Variable>& variables() const { return variables_; }
+  /// Assignments to variables that are set in order, by the piece behind them.
+  [[nodiscard]] const std::multimap<std::size_t, Assignment>& assignments() const { return assignments_; }
+  [[nodiscard]] bool is_set_in_order(const std::string& name) const { return variables_.at(name).in_order.size() > 1; }
+
+ private:
+  void note_block(std::size_t at);
+  [[nodiscard]] std::size_t function_here() const;
+  void note_assignment(std::size_t at);
+  void note_parameters(std::size_t at);
+  static void find_order(Variable& variable);
+
+  const std::vector<Piece>& pieces_;
+  std::string file_;
+  std::map<std::string, Variable> variables_;
+  std::multimap<std::size_t, Assignment> assignments_;
+  std::vector<std::size_t> open_;  ///< pieces that open blocks, while assignments are noted
+  const Settings* now_ = nullptr;
+};
+
+}  // namespace trammel::cam::urscript
