@@ -59,6 +59,9 @@ using Settings = std::map<const Declaration*, std::map<std::vector<std::size_t>,
 
 constexpr double kNoAxis = 8.9e9;  ///< an external axis that is at 9E9 is not there
 
+/// The name whose value an expression is a part of; nullptr: of none.
+[[nodiscard]] const Expression* name_in(const Expression& expression);
+
 /// Instructions of the controller that neither move the robot nor change the data which they are given.
 [[nodiscard]] bool is_still(const std::string& instruction);
 
