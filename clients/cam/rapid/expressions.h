@@ -1,0 +1,72 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/cam/rapid/syntax.h"
+#include "clients/cam/rapid/tokens.h"
+
+namespace trammel::cam::rapid {
+
+/// Goes through the tokens of a module, and reads the expressions among them.
+class Expressions {
+ protected:
+  explicit Expressions(std::string_view text) : text_(text), tokens_(tokens_of(text)) {}
+
+  [[nodiscard]] const Token& token(std::size_t ahead = 0) const {
+    return tokens_[std::min(at_ + ahead, tokens_.size() - 1)];
+  }
+  [[nodiscard]] bool at_end() const { return token().kind == TokenKind::kEnd; }
+  [[nodiscard]] std::string_view bytes(std::size_t ahead = 0) const {
+    const Token& t = token(ahead);
+    return text_.substr(t.begin, t.end - t.begin);
+  }
+  /// A sign of two bytes is `:=`; no other begins so.
+  [[nodiscard]] bool is_sign(std::string_view sign, std::size_t ahead = 0) const {
+    const Token& t = token(ahead);
+    return t.kind == TokenKind::kSign && t.end - t.begin == sign.size() && text_[t.begin] == sign[0];
+  }
+  [[nodiscard]] std::string word(std::size_t ahead = 0) const {
+    return token(ahead).kind == TokenKind::kWord ? in_lower_case(bytes(ahead)) : std::string();
+  }
+  bool take(std::string_view sign) {
+    if (!is_sign(sign)) return false;
+    ++at_;
+    return true;
+  }
+  std::string take_word() {
+    std::string text = word();
+    if (!text.empty()) ++at_;
+    return text;
+  }
+  [[nodiscard]] std::uint32_t last_end() const { return at_ == 0 ? 0 : tokens_[at_ - 1].end; }
+  /// A word that begins or ends something wherever it stands: a statement that lacks its end goes no further.
+  [[nodiscard]] bool is_reserved() const;
+  [[nodiscard]] bool at_statement_end() const { return at_end() || is_sign(";") || is_reserved(); }
+  static bool is_operator(const std::string& text);
+
+  Expression expression(int depth = 0);
+  Expression primary(int depth);
+
+  std::string_view text_;
+  std::vector<Token> tokens_;
+  std::size_t at_ = 0;
+
+ private:
+  Expression term(int depth);
+  Expression binary(Expression left, Expression (Expressions::*operand)(int), int depth);
+  Expression factor(int depth);
+  Expression unknown();
+  void aggregate(Expression& made, int depth);
+  bool plain_number(Expression& made);
+  void name(Expression& made, int depth);
+  void call(Expression& made, int depth);
+  void skip_to_closing(std::string_view opening, std::string_view closing);
+  void suffixes(Expression& made, int depth);
+};
+
+}  // namespace trammel::cam::rapid
