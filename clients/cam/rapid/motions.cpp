@@ -9,6 +9,8 @@ namespace trammel::cam::rapid {
 
 namespace {
 
+using Kind = Expression::Kind;
+
 std::set<std::string> names_of_motions() {
   struct Family {
     const char* beginning;

@@ -13,6 +13,8 @@ namespace trammel::cam::rapid {
 
 namespace {
 
+using Kind = Expression::Kind;
+
 /// The label of a routine that is named at run time.
 constexpr const char* kAnyRoutine = "any";
 
