@@ -60,6 +60,10 @@ struct CalibrationResult {
   double rms = 0;               ///< m, Euclidean residual of the training positions; of gauges alone: of their values
   double discrepancy = 0;       ///< m per axis: what the model leaves beyond the measurement's sigma
   double discrepancy_rotation = 0;  ///< rad per axis
+  double discrepancy_of_pose = 0;   ///< m per axis: what all positions at one joint vector share of it
+  /// m per axis: what each of so many positions at one joint vector is weighed with beside its own sigma: together as
+  /// one pose, as far as they share the arm's error.
+  [[nodiscard]] double discrepancy_of_one(int together) const;
   /// Geometric mean of the identified singular values over sqrt(poses) (Borm and Menq 1991).
   double observability_index = 0;
   std::vector<SuspectPose> suspects;  ///< farthest first

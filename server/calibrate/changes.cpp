@@ -89,8 +89,8 @@ class ChangeSearch {
     const Tracker& tracker = found.model.cell->tracker;
     const MeasurementBatch here = moved(batch, sessions_, tracker.sigma, tracker.sigma_rotation);
     find_middles(here);
-    const Weights weights{found.discrepancy, found.discrepancy_rotation, true};
-    for (const Measurement& m : here.measurements) add(m, weights);
+    const Weights weights = weights_of(found, here);
+    for (std::size_t row = 0; row < here.measurements.size(); ++row) add(here.measurements[row], weights, row);
     VectorXd at_rest = VectorXd::Zero(P);  // the shared parameters are where their gradient vanishes
     eliminate(blocks_, information_, at_rest);
     factor_.compute(information_);
@@ -241,8 +241,8 @@ class ChangeSearch {
     return joint * sessions_.size() + static_cast<std::size_t>(session);
   }
 
-  void add(const Measurement& m, const Weights& weights) {
-    const WeightedPose pose(kinds_.probe(), s_, m, weights);
+  void add(const Measurement& m, const Weights& weights, std::size_t row) {
+    const WeightedPose pose(kinds_.probe(), s_, m, weights, row);
     VectorXd r(pose.size());
     MatrixXd all(s_.scale.size(), pose.size());  // one column an equation
     if (!pose.evaluate(s_.prior.data(), r.data(), all.data())) return;

@@ -104,8 +104,7 @@ void add_dependence(Refit& refit, const CalibrationProblem& problem) {
   const CalibrationResult& found = refit.result;
   const std::vector<bool> none_held(static_cast<std::size_t>(found.model.values.size()), false);
   const ScaledParameters own = scaled_parameters(found.model, none_held);
-  const Expansion at =
-      expand({found.model, problem.batch}, own, {found.discrepancy, found.discrepancy_rotation, true}, true, own.prior);
+  const Expansion at = expand({found.model, problem.batch}, own, weights_of(found, problem.batch), true, own.prior);
   MatrixXd information = at.information(refit.anew, refit.anew);
   information.diagonal().array() += 1;
   const Eigen::LLT<MatrixXd> factor(information);

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "server/compensate/bias_physics.h"
+#include "server/measurement/pose_groups.h"
 
 namespace trammel {
 
@@ -52,6 +54,22 @@ VectorXd along_joint(const CompensatedModel& model, const MeasurementBatch& batc
   return along;
 }
 
+/// Poses, and what is left of each in the mean of the rows at its joint vector: rows of one pose keep one sign, and
+/// that is no structure.
+std::pair<MeasurementBatch, Eigen::Matrix3Xd> one_a_pose(const MeasurementBatch& batch,
+                                                         const Eigen::Matrix3Xd& residual_B) {
+  const std::vector<PoseGroup> poses = pose_groups(batch);
+  MeasurementBatch first = batch;
+  first.measurements.clear();
+  Eigen::Matrix3Xd mean_B(3, std::ssize(poses));
+  for (Index p = 0; p < std::ssize(poses); ++p) {
+    const PoseGroup& rows = poses[static_cast<std::size_t>(p)];
+    first.measurements.push_back(batch.measurements[static_cast<std::size_t>(rows.front())]);
+    mean_B.col(p) = residual_B(Eigen::all, rows).rowwise().mean();
+  }
+  return {std::move(first), std::move(mean_B)};
+}
+
 ResidualOrder order_of_joint(const Chain& robot, const MeasurementBatch& batch, const VectorXd& along, int joint) {
   std::vector<Index> sorted(static_cast<std::size_t>(along.size()));
   std::iota(sorted.begin(), sorted.end(), Index{0});
@@ -69,8 +87,9 @@ ResidualOrder order_of_joint(const Chain& robot, const MeasurementBatch& batch, 
 
 }  // namespace
 
-std::vector<ResidualOrder> residual_orders(const CompensatedModel& model, const MeasurementBatch& batch,
-                                           const Eigen::Matrix3Xd& residual_B) {
+std::vector<ResidualOrder> residual_orders(const CompensatedModel& model, const MeasurementBatch& given,
+                                           const Eigen::Matrix3Xd& residual_of_rows_B) {
+  const auto [batch, residual_B] = one_a_pose(given, residual_of_rows_B);
   ResidualOrder rows;
   for (int axis = 0; axis < 3; ++axis) add_runs(residual_B.row(axis).transpose(), rows);
   rows.correlation = correlation_of_next(residual_B);

@@ -1,5 +1,6 @@
 #include "server/measurement/pose_groups.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -36,6 +37,39 @@ std::vector<PoseGroup> pose_groups(const MeasurementBatch& batch) {
   std::vector<JointVector> q;
   for (const Measurement& m : batch.measurements) q.push_back(m.context.q);
   return pose_groups(q);
+}
+
+bool are_seen_together(const Measurement& a, const Measurement& b) {
+  return !a.gauge && !b.gauge && a.session == b.session && a.context.direction == b.context.direction;
+}
+
+std::vector<PoseGroup> groups_seen_together(const MeasurementBatch& batch) {
+  const auto at = [&](Index row) -> const Measurement& { return batch.measurements[static_cast<std::size_t>(row)]; };
+  std::vector<PoseGroup> groups;
+  for (const PoseGroup& rows : pose_groups(batch)) {
+    const auto first = std::ssize(groups);
+    for (const Index row : rows) {
+      const auto same = std::find_if(groups.begin() + first, groups.end(), [&](const PoseGroup& group) {
+        return are_seen_together(at(group.front()), at(row));
+      });
+      if (same == groups.end()) {
+        groups.push_back({row});
+      } else {
+        same->push_back(row);
+      }
+    }
+  }
+  return groups;
+}
+
+std::vector<int> counted_together(const MeasurementBatch& batch) {
+  const std::vector<PoseGroup> groups = groups_seen_together(batch);
+  if (groups.size() == batch.measurements.size()) return {};
+  std::vector<int> counts(batch.measurements.size(), 1);
+  for (const PoseGroup& rows : groups) {
+    for (const Index row : rows) counts[static_cast<std::size_t>(row)] = static_cast<int>(rows.size());
+  }
+  return counts;
 }
 
 }  // namespace trammel

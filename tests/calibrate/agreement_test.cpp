@@ -10,6 +10,7 @@
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
 #include "tests/support/demand.h"
+#include "tests/support/gauged_arm.h"
 #include "tests/support/virtual_robot.h"
 
 namespace trammel {
@@ -152,6 +153,36 @@ TEST(Agreement, TwoReflectorsThatWereExchangedInAQuarterOfThePosesAreFound) {
   const auto found = agreement(cell, kM3, batch);
   ASSERT_TRUE(found);
   EXPECT_EQ(rows_of(found->others), exchanged);
+}
+
+/// Draw wires from three corners, some of which told too much or too little by about `off_mm`; which.
+std::set<int> spoil(std::vector<test::GaugeRow>& rows, double share, double off_mm, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<std::size_t> order(rows.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::shuffle(order.begin(), order.end(), random);
+  std::set<int> bad;
+  for (std::size_t k = 0; static_cast<double>(k) + 1 <= share * static_cast<double>(order.size()); ++k) {
+    rows[order[k]].value_mm += (normal(random) > 0 ? 1 : -1) * off_mm * (1 + 0.3 * std::abs(normal(random)));
+    bad.insert(static_cast<int>(order[k]) + 2);
+  }
+  return bad;
+}
+
+TEST(Agreement, BadDistancesAreNamedAsBadPositionsAre) {
+  for (const bool known : {true, false}) {
+    const std::string places = known ? "" : test::unknown_places(test::three_corners());
+    const test::GaugedArm arm = test::gauged_arm(3, test::three_corners(), places);
+    for (const double share : {0.1, 0.2, 0.3, 0.4}) {
+      for (const double off_mm : {3.0, 30.0, 200.0}) {
+        std::vector<test::GaugeRow> rows = test::wire_rows(arm, 240, 3);
+        const std::set<int> bad = spoil(rows, share, off_mm, 4);
+        EXPECT_EQ(named(arm.cell, test::gauge_batch(arm, rows, 0.05, 3)), bad)
+            << (known ? "known, " : "unknown, ") << share << ", " << off_mm;
+      }
+    }
+  }
 }
 
 TEST(Agreement, AGoodBatchIsNotAsked) { EXPECT_FALSE(agreement(test::cell_7(), kM3, positions(60, 21))); }

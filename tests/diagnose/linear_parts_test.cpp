@@ -8,6 +8,7 @@
 #include "server/diagnose/families/candidates.h"
 #include "server/diagnose/search/folds.h"
 #include "server/measurement/checked_batch.h"
+#include "tests/support/three_reflectors.h"
 #include "tests/support/virtual_robot.h"
 
 namespace trammel::cause_search {
@@ -38,6 +39,25 @@ struct Calibrated {
   MeasurementBatch batch;
   PriorModel model;
 };
+
+/// A linear problem about a calibration of three reflectors.
+LinearProblem of_three_reflectors(const MeasurementBatch& batch) {
+  const auto cell = test::cell_of_three_reflectors();
+  const CalibrationResult calibration = *calibrate(cell, cell->model.error_sources, batch, {});
+  std::vector<Parameter> priors;
+  for (const IdentifiedParameter& one : calibration.parameters) priors.push_back(one.parameter);
+  return {calibration.model, batch, priors, {}};
+}
+
+TEST(LinearProblem, ReflectorsThatShareWhatIsLeftOfAPoseWeighAndCountAsOne) {
+  const MeasurementBatch shared = test::seen_by_three(70, 60e-6, 0, 6), apart = test::seen_by_three(70, 0, 60e-6, 6);
+  const LinearProblem one = of_three_reflectors(shared), three = of_three_reflectors(apart);
+  EXPECT_NEAR(one.noise(), three.noise(), 0.15 * three.noise()) << "a row is off by as much";
+  const double weight = one.weight().mean() * one.noise(), weight_apart = three.weight().mean() * three.noise();
+  EXPECT_LT(weight, 0.72) << "as one of three";
+  EXPECT_GT(weight_apart, 0.85);
+  EXPECT_LT(one.position_spread().freedom, 0.55 * three.position_spread().freedom);
+}
 
 TEST(Background, ProjectsAsTheInverseOfItsCovarianceDoes) {
   const MatrixXd Z = 3 * random_matrix(40, 6, 4);

@@ -113,8 +113,9 @@ Expansion expand(const CalibrationProblem& problem, const ScaledParameters& s, c
   Expansion at{0.5 * from_prior.squaredNorm(), from_prior, Eigen::MatrixXd::Zero(P, P)};
   const std::size_t sessions = problem.batch.sessions.size();
   Normals normals(at, sessions);
-  for (const Measurement& m : problem.batch.measurements) {
-    const WeightedPose pose(problem.model, s, m, weights);
+  for (std::size_t row = 0; row < problem.batch.measurements.size(); ++row) {
+    const Measurement& m = problem.batch.measurements[row];
+    const WeightedPose pose(problem.model, s, m, weights, row);
     normals.begin(sessions > 1 ? m.session : 0);
     const bool finite = pose.evaluate(x.data(), normals.residuals(), normals.jacobian());
     const double norm = finite ? normals.residuals(pose.size()).norm() : std::numeric_limits<double>::infinity();

@@ -8,7 +8,9 @@
 #include "server/calibrate/identify/gauss_newton.h"
 #include "server/calibrate/identify/minimise.h"
 #include "server/calibrate/identify/own_noise.h"
+#include "server/calibrate/identify/weighted_pose.h"
 #include "server/measurement/gauges.h"
+#include "server/measurement/pose_groups.h"
 #include "server/measurement/sessions.h"
 #include "server/numerics/product.h"
 
@@ -167,6 +169,25 @@ double freedom_of_sessions(const CalibrationProblem& problem) {
   return (problem.stretched ? 7.0 : 6.0) * static_cast<double>(problem.batch.sessions.size() - 1);
 }
 
+/// What the means of the positions at one joint vector tell of the parameters, each mean as sure as one of them.
+Eigen::MatrixXd information_of_means(const CalibrationProblem& problem, const ScaledParameters& s,
+                                     const Weights& weights, const Residuals& r, const Eigen::VectorXd& x) {
+  const Eigen::Index P = s.scale.size();
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(P, P), J(P, 6);
+  Eigen::VectorXd residual(6);
+  for (const std::vector<Eigen::Index>& columns : r.together) {
+    Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(P, 3);
+    for (const Eigen::Index column : columns) {
+      const Eigen::Index row = r.positions[static_cast<std::size_t>(column)];
+      const auto at = static_cast<std::size_t>(row);
+      const WeightedPose pose(problem.model, s, problem.batch.measurements[at], weights, at);
+      if (pose.evaluate(x.data(), residual.data(), J.data())) mean += J.leftCols(3);
+    }
+    sum.noalias() += mean * mean.transpose() / static_cast<double>(columns.size());
+  }
+  return sum;
+}
+
 /// How many parameters were fitted to either kind at the minimum under `weights`. Few parameters beside many equations,
 /// and several sessions, are shared out by number; else positions may have decided most of them, and are fitted much
 /// closer than orientations.
@@ -184,6 +205,12 @@ Freedom fitted(const CalibrationProblem& problem, const ScaledParameters& s, con
   turns_alone.discrepancy = std::numeric_limits<double>::infinity();
   const double decided = freedom_of(expand(problem, s, turns_alone, robust, at.x).information, at.information);
   return {all - decided, decided};
+}
+
+/// How many parameters were fitted to the means of the positions at one joint vector.
+double fitted_to_means(const CalibrationProblem& problem, const ScaledParameters& s, const Identified& now) {
+  const Eigen::MatrixXd means = information_of_means(problem, s, now.weights, now.residuals, now.minimum.x);
+  return freedom_of(means, now.minimum.information) + freedom_of_sessions(problem);
 }
 
 /// Gives each session the noise that it has beyond the others, and the residuals the sigmas that follow. False where
@@ -206,6 +233,7 @@ Result<Identified> settle(const CalibrationProblem& problem, const CalibrateOpti
   CalibrationProblem working = problem;
   Identified now;
   now.sessions = settings_of(problem.batch);
+  now.weights.together = counted_together(problem.batch);
   now.minimum.x = s.prior;
   now.minimum.converged = s.scale.size() == 0;
   now.minimum.message = "nothing to identify";
@@ -221,6 +249,8 @@ Result<Identified> settle(const CalibrationProblem& problem, const CalibrateOpti
       take_over_sessions(problem.batch, now, working.batch, tracker);
     }
     now.residuals = residuals_of(problem.model, working.batch, s.values_at(now.minimum.x));
+    if (!now.weights.together.empty()) now.residuals.together = columns_together(working.batch, now.residuals);
+    if (s.scale.size() > 0 && !now.residuals.together.empty()) freedom.means = fitted_to_means(working, s, now);
     const bool same_noise =
         now.sessions.empty() || estimate_own_noise(now, freedom, problem.batch, working.batch, tracker);
     const Weights before = now.weights;
@@ -247,6 +277,7 @@ Result<CalibrationResult> identify(const CalibrationProblem& problem, const Cali
   result.model.values = s.values_at(found->minimum.x);
   result.discrepancy = found->weights.discrepancy;
   result.discrepancy_rotation = found->weights.discrepancy_rotation;
+  result.discrepancy_of_pose = found->weights.of_pose;
   result.log_evidence = result.log_likelihood = log_likelihood(r, found->weights);
   result.suspects = suspects_of(problem.batch, r, found->weights);
   result.rms = r.rms();

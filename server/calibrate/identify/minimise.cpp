@@ -50,8 +50,8 @@ Result<Minimum> guarded_steps(const CalibrationProblem& problem, const ScaledPar
                               const CalibrateOptions& calibrate_options, Eigen::VectorXd x) {
   const bool robust = is_robust(calibrate_options, weights);
   ceres::Problem ceres_problem;
-  for (const Measurement& m : problem.batch.measurements) {
-    const WeightedPose pose(problem.model, s, m, weights);
+  for (std::size_t row = 0; row < problem.batch.measurements.size(); ++row) {
+    const WeightedPose pose(problem.model, s, problem.batch.measurements[row], weights, row);
     ceres_problem.AddResidualBlock(new PoseCost(pose, s.scale.size()),
                                    robust ? new ceres::HuberLoss(pose.huber_limit()) : nullptr, x.data());
   }

@@ -150,7 +150,7 @@ Status search_orders(CalibrationProblem& problem, const CalibrateOptions& option
     if (!found) return tl::make_unexpected(found.error());
     const MeasurementBatch batch = aligned(problem.batch, found->sessions, model.cell->tracker);
     const Residuals r = residuals_of(found->model, batch, found->model.values);
-    const Weights weights{found->discrepancy, found->discrepancy_rotation, true};
+    const Weights weights = weights_of(*found, batch);
     FoundOrder best;
     std::size_t strongest = open.front();
     for (const std::size_t k : open) {

@@ -24,12 +24,15 @@ double median(std::vector<double> values) {
 struct Squares {
   std::vector<std::vector<double>> ratio;
   std::vector<double> variance;  // sums
+  std::vector<double> poses;     // joint vectors
 
-  explicit Squares(std::size_t sessions) : ratio(sessions), variance(sessions, 0.0) {}
-  void add(int session, double square, double of) {
+  explicit Squares(std::size_t sessions) : ratio(sessions), variance(sessions, 0.0), poses(sessions, 0.0) {}
+  /// One of so many of its joint vector.
+  void add(int session, double square, double of, int together) {
     const auto s = static_cast<std::size_t>(session);
     ratio[s].push_back(square / of);
     variance[s] += of;
+    poses[s] += 1.0 / together;
   }
 };
 
@@ -46,7 +49,8 @@ std::vector<double> beyond_others(const Squares& squares, double share) {
   const double usual = median(all);
   for (std::size_t s = 0; s < S; ++s) {
     const auto n = static_cast<double>(squares.ratio[s].size());
-    if (level[s] <= usual * (1 + kBeyondChance * kSpreadOfMedian / std::sqrt(std::max(1.0, n)))) continue;
+    if (level[s] <= usual * (1 + kBeyondChance * kSpreadOfMedian / std::sqrt(std::max(1.0, squares.poses[s]))))
+      continue;
     beyond[s] = (level[s] - usual) * squares.variance[s] / n;
   }
   return beyond;
@@ -62,14 +66,15 @@ void set_own_noise(const Residuals& r, const Freedom& freedom, const Weights& we
     const Measurement& m = batch.measurements[i];
     const auto at = static_cast<Eigen::Index>(i);
     const SessionSetting& session = sessions[static_cast<std::size_t>(m.session)];
+    const int together = i < weights.together.size() ? weights.together[i] : 1;
     const double own = std::pow(session.own_noise, 2);
     const double rest = std::max(0.0, r.sigma(at) * r.sigma(at) - own) + std::pow(weights.discrepancy, 2);
-    positions.add(m.session, r.position.col(at).squaredNorm(), rest);
+    positions.add(m.session, r.position.col(at).squaredNorm(), rest, together);
     if (!m.R_WT) continue;
     const double own_turn = std::pow(session.own_noise_rotation, 2);
     const double rest_turn =
         std::max(0.0, std::pow(r.sigma_rotation(turned), 2) - own_turn) + std::pow(weights.discrepancy_rotation, 2);
-    rotations.add(m.session, r.rotation.col(turned++).squaredNorm(), rest_turn);
+    rotations.add(m.session, r.rotation.col(turned++).squaredNorm(), rest_turn, together);
   }
   const auto share_left = [](double fitted, Eigen::Index vectors) {
     return std::max(0.1, 1 - fitted / (3.0 * static_cast<double>(std::max<Eigen::Index>(1, vectors))));

@@ -25,12 +25,11 @@ Matrix3 right_jacobian_inverse(const Vector3& w) {
 }  // namespace
 
 WeightedPose::WeightedPose(const PhysicalModel& model, const ScaledParameters& s, const Measurement& measurement,
-                           const Weights& weights)
+                           const Weights& weights, std::size_t row)
     : model_(model),
       s_(s),
       measurement_(measurement),
-      inverse_sigma_(1 / std::hypot(position_sigma(measurement, *model.cell),
-                                    std::sqrt(gauged_poses(measurement)) * weights.discrepancy)),
+      inverse_sigma_(1 / std::hypot(position_sigma(measurement, *model.cell), weights.beside(measurement, row))),
       inverse_rotation_sigma_(1 / std::hypot(rotation_sigma(measurement, *model.cell), weights.discrepancy_rotation)) {}
 
 bool WeightedPose::evaluate_gauge(const Eigen::VectorXd& values, double* residuals, double* jacobian) const {

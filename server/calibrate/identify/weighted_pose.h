@@ -11,8 +11,9 @@ namespace trammel {
 /// their scale. Keeps references to its arguments.
 class WeightedPose {
  public:
+  /// `row`: its place in the batch that the weights are of.
   WeightedPose(const PhysicalModel& model, const ScaledParameters& s, const Measurement& measurement,
-               const Weights& weights);
+               const Weights& weights, std::size_t row = 0);
 
   /// How many equations: 6, 3 without an orientation, 1 of a gauge.
   [[nodiscard]] int size() const { return measurement_.gauge ? 1 : measurement_.R_WT ? 6 : 3; }

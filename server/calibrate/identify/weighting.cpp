@@ -7,6 +7,7 @@
 
 #include "server/base/units.h"
 #include "server/error_sources/anchors.h"
+#include "server/measurement/pose_groups.h"
 
 namespace trammel {
 
@@ -16,6 +17,8 @@ constexpr double kSuspect = 5.5;        // norm of 3 axes that 1 in 10^6 good po
 constexpr double kSuspectGauge = 4.89;  // the same of 1 axis
 constexpr double kSettledSigma = 2e-3;  // relative: a sigma that changes by less weighs the same
 constexpr int kBisections = 100;        // more than a double has bits
+constexpr double kLeastOwn = 0.25;      // of the stated variance, that no other position shares
+constexpr double kLeastShare = 0.05;    // of the axes of few poses, that no parameter is taken to be fitted to
 
 /// Squared residuals, each of so many axes, with their variances and how often the model's own enters them.
 struct Squares {
@@ -82,6 +85,56 @@ Squares turns_of(const Residuals& r) {
   return turns;
 }
 
+/// Positions at one joint vector: their mean, and how far each is from it.
+struct SeenTogether {
+  Vector3 mean = Vector3::Zero();
+  double variance = 0;  // m², of one of them as stated
+  double apart = 0;     // m², sum of squares about the mean
+  double count = 0;
+};
+
+SeenTogether seen_together(const Residuals& r, const std::vector<Eigen::Index>& columns) {
+  SeenTogether seen;
+  seen.count = static_cast<double>(columns.size());
+  for (const Eigen::Index i : columns) {
+    seen.mean += r.position.col(i) / seen.count;
+    seen.variance += r.sigma(i) * r.sigma(i) / seen.count;
+  }
+  for (const Eigen::Index i : columns) seen.apart += (r.position.col(i) - seen.mean).squaredNorm();
+  return seen;
+}
+
+/// m per axis: what the means of positions at one joint vector are off by beyond their sigmas, no more than each of
+/// them is with the `discrepancy`. 0 where none are together.
+double shared_by_poses(const Residuals& r, const Freedom& freedom, double discrepancy, const Weights& before,
+                       bool drop_suspects) {
+  if (r.together.empty()) return 0;
+  Squares means;
+  double most = std::pow(discrepancy, 2);
+  for (const std::vector<Eigen::Index>& columns : r.together) {
+    const SeenTogether seen = seen_together(r, columns);
+    const double sigma = std::sqrt(seen.variance / seen.count);
+    most += seen.variance * (1 - 1 / seen.count) / static_cast<double>(r.together.size());
+    if (drop_suspects && seen.mean.norm() > kSuspect * std::hypot(sigma, before.of_pose)) continue;
+    means.add(seen.mean.squaredNorm(), sigma, 1, 3);
+  }
+  const double axes = 3.0 * static_cast<double>(r.together.size());
+  return std::min(std::sqrt(most), surplus(means, means.axes * std::max(kLeastShare, 1 - freedom.means / axes)));
+}
+
+/// Nat, of positions that share an error at one joint vector (compound symmetry): of their mean, and of what sets them
+/// apart.
+double log_likelihood_together(const Residuals& r, const std::vector<Eigen::Index>& columns, const Weights& weights) {
+  const SeenTogether seen = seen_together(r, columns);
+  const double all = seen.variance + std::pow(weights.discrepancy, 2);
+  const double own = std::max(kLeastOwn * seen.variance, all - std::pow(weights.of_pose, 2));
+  const double of_sum = own + seen.count * std::pow(weights.of_pose, 2);
+  const double limit = kSuspect * kSuspect;
+  const double square = std::min(seen.count * seen.mean.squaredNorm() / of_sum, limit) +
+                        std::min(seen.apart / own, (seen.count - 1) * limit);
+  return -0.5 * square - 1.5 * (std::log(2 * kPi * of_sum) + (seen.count - 1) * std::log(2 * kPi * own));
+}
+
 /// Of so many axes, the part that no parameter was fitted to.
 double share_left(double freedom, double axes) { return axes > 0 ? std::max(0.0, 1 - freedom / axes) : 0; }
 
@@ -93,6 +146,28 @@ double rotation_sigma(const Measurement& m, const Cell& cell) {
   return m.sigma_rotation.value_or(cell.tracker.sigma_rotation);
 }
 
+double Weights::beside(const Measurement& m, std::size_t row) const {
+  const double alone = std::sqrt(gauged_poses(m)) * discrepancy;
+  const int count = row < together.size() ? together[row] : 1;
+  return count > 1 ? std::max(alone, std::sqrt(count) * of_pose) : alone;
+}
+
+Weights weights_of(const CalibrationResult& found, const MeasurementBatch& batch) {
+  return {found.discrepancy, found.discrepancy_rotation, true, found.discrepancy_of_pose, counted_together(batch)};
+}
+
+std::vector<std::vector<Eigen::Index>> columns_together(const MeasurementBatch& batch, const Residuals& r) {
+  std::vector<Eigen::Index> column_of(batch.measurements.size(), -1);
+  for (Eigen::Index column = 0; column < r.position.cols(); ++column)
+    column_of[static_cast<std::size_t>(r.positions[static_cast<std::size_t>(column)])] = column;
+  std::vector<std::vector<Eigen::Index>> together;
+  for (PoseGroup& rows : groups_seen_together(batch)) {
+    for (Eigen::Index& row : rows) row = column_of[static_cast<std::size_t>(row)];
+    if (rows.front() >= 0) together.push_back(std::move(rows));
+  }
+  return together;
+}
+
 double gauged_poses(const Measurement& m) { return m.gauge && m.gauge->minus != nullptr ? 2 : 1; }
 
 double Residuals::rms() const {
@@ -102,8 +177,16 @@ double Residuals::rms() const {
 
 Residuals residuals_of(const PhysicalModel& model, const MeasurementBatch& batch, const Eigen::VectorXd& values) {
   const auto n = static_cast<Eigen::Index>(batch.measurements.size());
-  Residuals r{Eigen::Matrix3Xd(3, n), Eigen::Matrix3Xd(3, n), Eigen::VectorXd(n), Eigen::VectorXd(n), {}, {},
-              Eigen::VectorXd(n),     Eigen::VectorXd(n),     Eigen::VectorXd(n)};
+  Residuals r{Eigen::Matrix3Xd(3, n),
+              Eigen::Matrix3Xd(3, n),
+              Eigen::VectorXd(n),
+              Eigen::VectorXd(n),
+              {},
+              {},
+              Eigen::VectorXd(n),
+              Eigen::VectorXd(n),
+              Eigen::VectorXd(n),
+              {}};
   Eigen::Index turned = 0, placed = 0, gauged = 0;
   for (Eigen::Index i = 0; i < n; ++i) {
     const Measurement& m = batch.measurements[static_cast<std::size_t>(i)];
@@ -136,8 +219,9 @@ Weights estimated_weights(const Residuals& r, const Freedom& freedom, const Weig
   const Squares turns = turns_of(r);
   const double lengths = 3.0 * static_cast<double>(r.position.cols()) + static_cast<double>(r.gauge.size());
   const Squares trusted = lengths_of(r, drop_suspects ? std::optional(before) : std::nullopt);
-  return {surplus(trusted, trusted.axes * share_left(freedom.positions, lengths)),
-          surplus(turns, turns.axes * share_left(freedom.turns, turns.axes)), true};
+  const double discrepancy = surplus(trusted, trusted.axes * share_left(freedom.positions, lengths));
+  return {discrepancy, surplus(turns, turns.axes * share_left(freedom.turns, turns.axes)), true,
+          shared_by_poses(r, freedom, discrepancy, before, drop_suspects), before.together};
 }
 
 bool are_settled(const Weights& now, const Weights& before, const Tracker& tracker) {
@@ -145,6 +229,7 @@ bool are_settled(const Weights& now, const Weights& before, const Tracker& track
     return std::abs(std::hypot(sigma, a) - std::hypot(sigma, b)) <= kSettledSigma * std::hypot(sigma, a);
   };
   return before.estimated && settled(tracker.sigma, now.discrepancy, before.discrepancy) &&
+         settled(tracker.sigma, now.of_pose, before.of_pose) &&
          settled(tracker.sigma_rotation, now.discrepancy_rotation, before.discrepancy_rotation);
 }
 
@@ -187,7 +272,9 @@ double log_likelihood(const Residuals& r, const Weights& weights) {
     const double square = std::min(residual.squaredNorm() / variance, kSuspect * kSuspect);
     sum -= 0.5 * square + 1.5 * std::log(2 * kPi * variance);
   };
-  for (Eigen::Index i = 0; i < r.position.cols(); ++i) add(r.position.col(i), r.sigma(i), weights.discrepancy);
+  for (const std::vector<Eigen::Index>& columns : r.together) sum += log_likelihood_together(r, columns, weights);
+  for (Eigen::Index i = 0; r.together.empty() && i < r.position.cols(); ++i)
+    add(r.position.col(i), r.sigma(i), weights.discrepancy);
   for (Eigen::Index i = 0; i < r.rotation.cols(); ++i) {
     add(r.rotation.col(i), r.sigma_rotation(i), weights.discrepancy_rotation);
   }

@@ -13,7 +13,17 @@ struct Weights {
   double discrepancy = 0;           ///< m per axis
   double discrepancy_rotation = 0;  ///< rad per axis
   bool estimated = false;           ///< false: not yet, the measurement's sigma counts alone
+  double of_pose = 0;               ///< m per axis: what positions at one joint vector share of the discrepancy
+
+  std::vector<int> together = {};  ///< of each row of the batch: counted_together()
+
+  /// m per axis: what `m`, that `row` of the batch, is weighed with beside its own sigma. A gauge that is told against
+  /// another pose has twice the variance; positions at one joint vector weigh together as one pose as far as they share
+  /// the error.
+  [[nodiscard]] double beside(const Measurement& m, std::size_t row) const;
 };
+/// Those under which `found` was found, for the rows of `batch`.
+[[nodiscard]] Weights weights_of(const CalibrationResult& found, const MeasurementBatch& batch);
 
 /// Standard deviation of one axis of the measured position, or of the gauge, m: the measurement's own, else the
 /// tracker's.
@@ -33,6 +43,9 @@ struct Residuals {
   std::vector<Eigen::Index> positions, gauges;  ///< which measurement each is of; empty gauges: all have positions
   Eigen::VectorXd gauge;                        ///< G, m
   Eigen::VectorXd sigma_gauge, poses_of_gauge;  ///< G: standard deviations; gauged_poses()
+  /// Columns of `position` that stand at one joint vector; empty where none are together, or nobody asked
+  /// (columns_together()).
+  std::vector<std::vector<Eigen::Index>> together;
 
   /// m: rms of the Euclidean residuals of the positions; where there are none, of the gauges.
   [[nodiscard]] double rms() const;
@@ -42,10 +55,15 @@ struct Residuals {
 [[nodiscard]] Residuals residuals_of(const PhysicalModel& model, const MeasurementBatch& batch,
                                      const Eigen::VectorXd& values);
 
+/// Residuals::together of residuals that have none yet.
+[[nodiscard]] std::vector<std::vector<Eigen::Index>> columns_together(const MeasurementBatch& batch,
+                                                                      const Residuals& r);
+
 /// How many parameters were fitted to the residuals of either kind: what each kind decides, not the priors.
 struct Freedom {
   double positions = 0;  ///< and gauges
   double turns = 0;
+  double means = 0;  ///< to the means of the positions at one joint vector
 };
 
 /// The discrepancies under which the residuals are as large as expected after these parameters were fitted to them.

@@ -122,7 +122,7 @@ class MapSearch {
  public:
   MapSearch(const CalibrationResult& without, const MeasurementBatch& batch, const std::vector<int>& joints)
       : problem_{without.model, aligned(batch, without.sessions, without.model.cell->tracker)},
-        weights_{without.discrepancy, without.discrepancy_rotation, true} {
+        weights_(weights_of(without, batch)) {
     for (const int joint : joints) most_[joint] = most_harmonics(without.model.cell->robot, batch, joint);
   }
 
@@ -160,6 +160,7 @@ class MapSearch {
     const Tracker& tracker = problem_.model.cell->tracker;
     const auto [places, turns] = evidence.noise(logs_);
     weights_.discrepancy = discrepancy_for(places, tracker.sigma, weights_.discrepancy);
+    if (weights_.of_pose > 0) weights_.of_pose = discrepancy_for(places, tracker.sigma, weights_.of_pose);
     weights_.discrepancy_rotation = discrepancy_for(turns, tracker.sigma_rotation, weights_.discrepancy_rotation);
   }
 

@@ -53,8 +53,8 @@ LinearArm linear_arm(const CalibrationProblem& problem, const Weights& weights) 
   const Eigen::VectorXd x = arm.scaled.prior;
   Eigen::VectorXd r(6);
   Eigen::MatrixXd J(P, 6);
-  for (const Measurement& m : problem.batch.measurements) {
-    const WeightedPose pose(problem.model, arm.scaled, m, weights);
+  for (std::size_t row = 0; row < problem.batch.measurements.size(); ++row) {
+    const WeightedPose pose(problem.model, arm.scaled, problem.batch.measurements[row], weights, row);
     if (!pose.evaluate(x.data(), r.data(), J.data())) continue;
     const Index size = pose.size();
     const Index of_place = std::min<Index>(size, 3);

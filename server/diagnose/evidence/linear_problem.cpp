@@ -7,6 +7,7 @@
 #include "server/base/check.h"
 #include "server/diagnose/evidence/background.h"
 #include "server/error_sources/spelling.h"
+#include "server/measurement/pose_groups.h"
 #include "server/numerics/product.h"
 
 namespace trammel::cause_search {
@@ -85,23 +86,19 @@ VectorXd distance_of(const Measurement& m, const Pose& X_WT) {
   return distance;
 }
 
-/// What is left of `residual` (SI) beside the model's own parameters, and the share of freedom that they leave.
-struct Leftover {
-  VectorXd residual;
-  double share = 1;
-};
 /// `nuisance`: what the parameters do, SI, in units of their `scales`. `sigma`: of each row.
-Leftover leftover_of(const VectorXd& residual, const MatrixXd& nuisance, const VectorXd& scales,
-                     const VectorXd& sigma) {
-  const MatrixXd scaled = sigma.cwiseInverse().asDiagonal() * nuisance * scales.asDiagonal();
+LinearProblem::Leftover leftover_of(const VectorXd& residual, const MatrixXd& nuisance, const VectorXd& scales,
+                                    const VectorXd& sigma) {
+  MatrixXd scaled = sigma.cwiseInverse().asDiagonal() * nuisance * scales.asDiagonal();
   MatrixXd information = gram(scaled);
   information.diagonal().array() += 1;
-  const MatrixXd inverse = inverse_factor_of(information);
+  MatrixXd inverse = inverse_factor_of(information);
   // The trace of the fit's hat matrix, priors included.
   const double taken = static_cast<double>(scales.size()) - inverse.squaredNorm();
   const VectorXd right = scaled.transpose() * residual.cwiseQuotient(sigma);
   return {residual - sigma.asDiagonal() * (scaled * (inverse.transpose() * (inverse * right))),
-          std::max(kLeastFreedom, 1 - taken / static_cast<double>(residual.size()))};
+          std::max(kLeastFreedom, 1 - taken / static_cast<double>(residual.size())), std::move(scaled),
+          std::move(inverse)};
 }
 
 }  // namespace
@@ -210,6 +207,7 @@ void LinearProblem::whiten() {
   const double surplus_rotation = robust_surplus(left.residual(rotation), sigma_(rotation), left.share);
   weight_.resize(sigma_.size());
   position_ = weigh(position, surplus, left.share);
+  weigh_together(left);
   rotation_ = weigh(rotation, surplus_rotation, left.share);
 
   residual_ = residual_.cwiseProduct(weight_).eval();
@@ -233,6 +231,45 @@ LinearProblem::Spread LinearProblem::weigh(const std::vector<Index>& rows, doubl
     weight_(row) = 1 / sigma;
   }
   return {std::sqrt(sum / count), stated, share * count};
+}
+
+/// Weighs positions at one joint vector as one pose as far as their means are off by more than chance makes of what is
+/// left of each (design effect), and counts their freedom so.
+void LinearProblem::weigh_together(const Leftover& left) {
+  const std::vector<PoseGroup> groups = groups_seen_together(*batch_);
+  if (std::ssize(groups) == poses()) return;
+  VectorXd mean(3 * std::ssize(groups)), sigma(3 * std::ssize(groups));
+  double taken = 0, rows_of_a_pose = 0;
+  for (Index g = 0; g < std::ssize(groups); ++g) {
+    const PoseGroup& group = groups[static_cast<std::size_t>(g)];
+    const auto count = static_cast<double>(group.size());
+    MatrixXd rows = MatrixXd::Zero(3, left.scaled.cols());
+    Vector3 sum = Vector3::Zero(), variance = Vector3::Zero();
+    for (const Index i : group) {
+      sum += left.residual.segment<3>(first_row(i));
+      variance += sigma_.segment<3>(first_row(i)).cwiseAbs2();
+      rows += left.scaled.middleRows<3>(first_row(i));
+    }
+    mean.segment<3>(3 * g) = sum / count;
+    sigma.segment<3>(3 * g) = variance.cwiseSqrt() / count;
+    taken += (rows * left.root.transpose()).squaredNorm() / count;
+    rows_of_a_pose += count * count / static_cast<double>(poses());
+  }
+  const double share = std::max(kLeastFreedom, 1 - taken / static_cast<double>(mean.size()));
+  const double of_pose = robust_surplus(mean, sigma, share);
+  for (const PoseGroup& group : groups) {
+    const auto count = static_cast<double>(group.size());
+    for (const Index i : group) {
+      auto weight = weight_.segment<3>(first_row(i));
+      const auto own = sigma_.segment<3>(first_row(i));
+      // No more than if all that is left were shared.
+      const Vector3 most = std::sqrt(count) * weight.cwiseInverse();
+      const Vector3 together = (own.array().square() + count * of_pose * of_pose).sqrt();
+      if (group.size() > 1) weight = together.cwiseMin(most).cwiseMax(weight.cwiseInverse()).cwiseInverse().eval();
+    }
+  }
+  const double shared = std::min(1.0, std::pow(of_pose / position_.noise, 2));
+  position_.freedom /= 1 + (rows_of_a_pose - 1) * shared * shared;
 }
 
 Eigen::Matrix3Xd LinearProblem::positions(const VectorXd& whitened) const {

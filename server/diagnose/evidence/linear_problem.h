@@ -47,7 +47,8 @@ class LinearProblem {
   [[nodiscard]] const std::vector<Effect>& effects() const { return effects_; }
   /// R x n: what one radian (metre) of each joint's gear does, whitened.
   [[nodiscard]] const Eigen::MatrixXd& by_joint() const { return by_joint_; }
-  /// R: 1 / standard deviation of each row, in 1/m and 1/rad.
+  /// R: 1 / standard deviation of each row, in 1/m and 1/rad. Positions at one joint vector weigh together as one pose
+  /// as far as they share what is left.
   [[nodiscard]] const Eigen::VectorXd& weight() const { return weight_; }
   /// m per axis: noise of a typical position, whatever its reason. A root mean square.
   [[nodiscard]] double noise() const { return position_.noise; }
@@ -56,7 +57,13 @@ class LinearProblem {
   /// The same of positions (m per axis) and of orientations (rad per axis), with the degrees of freedom behind them.
   struct Spread {
     double noise = 0, stated = 0;
-    double freedom = 0;  ///< 0 where none were measured
+    double freedom = 0;  ///< 0 where none were measured; positions of a pose that share an error count as fewer
+  };
+  /// What is left of the residual (SI) beside the model's own parameters, and the share of freedom that they leave.
+  struct Leftover {
+    Eigen::VectorXd residual;
+    double share = 1;
+    Eigen::MatrixXd scaled, root;  ///< of rows in units of their sigma; scaled rootᵀ is a root of the fit's hat matrix
   };
   [[nodiscard]] const Spread& position_spread() const { return position_; }
   [[nodiscard]] const Spread& rotation_spread() const { return rotation_; }
@@ -73,6 +80,7 @@ class LinearProblem {
   void measure(Eigen::Index pose, const Pose& X_WT);
   void whiten();
   Spread weigh(const std::vector<Eigen::Index>& rows, double surplus, double share);
+  void weigh_together(const Leftover& left);
 
   PhysicalModel model_;
   const MeasurementBatch* batch_;

@@ -36,8 +36,10 @@ Surrogates put_in_surrogates(MeasurementBatch& batch, const Chain& robot) {
     if (put.direction) {
       const JointVector way = robot.gear_angles(last == nullptr ? JointVector::Zero(m.context.q.size())
                                                                 : JointVector(m.context.q - last->context.q));
-      m.context.direction.clear();
-      for (const double one : way) m.context.direction.push_back(one > 0 ? 1 : one < 0 ? -1 : 0);
+      const bool stays = last != nullptr && way.isZero(0);  // another reflector, or the same again
+      m.context.direction = stays ? last->context.direction : std::vector<int>();
+      for (Eigen::Index j = 0; !stays && j < way.size(); ++j)
+        m.context.direction.push_back(way(j) > 0 ? 1 : way(j) < 0 ? -1 : 0);
     }
     last = &m;
     ++row;

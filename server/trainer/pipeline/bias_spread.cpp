@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "server/bias/kernels/kernel_spelling.h"
+#include "server/measurement/pose_groups.h"
 
 namespace trammel {
 
@@ -38,11 +39,17 @@ double uncertain(const BiasPrediction& bias, double instrument, double identifie
   return bias.covariance_B.trace() + (noise.array() - instrument).max(0.0).sum() + 3 * bias.prior_share * identified;
 }
 
-/// Adds every fifth pose from `first` on; false where nothing can be said without them.
+/// Adds every fifth pose from `first` on, with all rows of its joint vector; false where nothing can be said without
+/// them.
 bool add_fold(const BiasProblem& problem, const BiasOptions& options, bool has_parameters, const LeftOut& left_out,
               Index first, Missed& missed) {
   std::vector<Index> block, rest;
-  for (Index i = 0; i < problem.q.rows(); ++i) (i % kFolds == first ? block : rest).push_back(i);
+  const std::vector<PoseGroup> poses = pose_groups(problem.q);
+  for (Index p = 0; p < std::ssize(poses); ++p) {
+    const PoseGroup& rows = poses[static_cast<std::size_t>(p)];
+    std::vector<Index>& to = p % kFolds == first ? block : rest;
+    to.insert(to.end(), rows.begin(), rows.end());
+  }
   const auto without = left_out.without(block);
   if (!without) return false;
   const BiasProblem fewer{problem.q(rest, Eigen::all), without->residual_B(rest, Eigen::all), problem.sigma(rest),

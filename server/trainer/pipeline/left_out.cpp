@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/measurement/pose_groups.h"
+
 namespace trammel {
 
 using Eigen::Index;
@@ -43,6 +45,7 @@ std::vector<const Measurement*> observations(const CalibrationResult& found, con
 
 LeftOut::LeftOut(const CalibrationResult& found, const MeasurementBatch& batch) {
   const PhysicalModel& model = found.model;
+  const std::vector<int> together = counted_together(batch);
   const std::vector<const Measurement*> poses = observations(found, batch);
   const auto count = static_cast<Index>(poses.size());
   R_BW_ = model.X_WB.linear().transpose();
@@ -55,7 +58,9 @@ LeftOut::LeftOut(const CalibrationResult& found, const MeasurementBatch& batch) 
     const Measurement& m = *poses[static_cast<std::size_t>(i)];
     const Pose X_WT = model.pose_W(m.context, model.values, &J_W);
     q_.row(i) = m.context.q.transpose();
-    sigma_(i) = std::hypot(m.sigma.value_or(model.cell->tracker.sigma), found.discrepancy);
+    const auto row = static_cast<std::size_t>(&m - batch.measurements.data());
+    sigma_(i) = std::hypot(m.sigma.value_or(model.cell->tracker.sigma),
+                           found.discrepancy_of_one(together.empty() ? 1 : together[row]));
     residual_.segment<3>(6 * i) = (m.p_W - X_WT.translation()) / sigma_(i);
     J_.middleRows<3>(6 * i) = J_W.topRows<3>() / sigma_(i);
     if (!m.R_WT) continue;
