@@ -5,6 +5,7 @@
 
 #include "server/base/units.h"
 #include "server/calibrate/frames/frames.h"
+#include "server/compensate/hidden_error.h"
 #include "server/compensate/paired_gain.h"
 #include "server/compensate/session_changes.h"
 #include "server/error_sources/anchors.h"
@@ -238,24 +239,20 @@ void add_left_over(const CompensatedModel::Parts& parts, std::vector<Note>& note
 }
 
 /// What the physics leaves is the most that the instrument's own error can be. Where more is stated, an error of the
-/// arm is taken for the instrument's.
-void add_overstated(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
-  constexpr double kOverstated = 0.5;  // of the stated sigma
-  constexpr double kFreedom = 60;      // known to a tenth
-  constexpr double kAll = 0.995;
-  const double freedom = 3.0 * parts.training.poses - parts.rank;
-  if (freedom < kFreedom) return;
-  const double stated = parts.physics.cell->tracker.sigma;
-  const double left = parts.training.calibrated.rms * std::sqrt(parts.training.poses / freedom);
-  // Rows that are means of repeats, or state a sigma of their own, have a smaller one, and do not all lie within it.
-  const bool all_inside = parts.training.coverage_95_stated.value_or(0) > kAll;
-  if (!all_inside || !(left < kOverstated * stated)) return;
+/// arm is taken for the instrument's. Said where that changes a promise: without a bias it is promised with
+/// (hidden_by_sigma()), and that is for information.
+void add_overstated(const CompensatedModel& model, std::vector<Note>& notes) {
+  const CompensatedModel::Parts& parts = model.parts();
+  const bool counted = parts.discrepancy > 0;
+  const double left = !parts.bias ? (counted ? left_within_sigma(parts) : 0) : hidden_by_sigma(model);
+  if (left == 0) return;
   notes.push_back(
-      {"sigma_overstated", Severity::kWarning,
-       fmt::format("{:.3f} mm an axis is left at the training poses, and a sigma of {:.3f} mm is stated: what "
-                   "the arm errs may be taken for the instrument's error, and is not promised; state the "
-                   "instrument's own sigma (tracker: sigma_mm) and train again",
-                   to_mm(left), to_mm(stated))});
+      {"sigma_overstated", parts.bias ? Severity::kWarning : Severity::kInfo,
+       fmt::format("{:.3f} mm an axis is left at the training poses, and a sigma of {:.3f} mm is stated: {}; state "
+                   "the instrument's own sigma (tracker: sigma_mm) and train again",
+                   to_mm(left), to_mm(parts.physics.cell->tracker.sigma),
+                   parts.bias ? "what the arm errs may be taken for the instrument's error, and is not promised"
+                              : "all that is left is taken for the arm's error, which makes what is promised larger")});
 }
 
 /// The drawing knows no number of the batch, so nothing can make its errors small.
@@ -387,7 +384,7 @@ std::vector<Note> notes_of(const CompensatedModel& model) {
   add_what_data_added(model.parts(), notes);
   add_idle_sources(model.parts(), notes);
   add_left_over(model.parts(), notes);
-  add_overstated(model.parts(), notes);
+  add_overstated(model, notes);
   add_computed_positions(model.parts(), notes);
   add_suspects(model.parts(), notes);
   add_untold_turn(model.parts(), notes);

@@ -21,9 +21,10 @@ constexpr const char* kOneSide = "approached_from_one_side";
 ///
 /// `kStop`: a number of the robot file is farther off than a robot is off its drawing (3 mm, 3 mrad, 1 degree of a
 /// zero), so the file is not the controller's, which solves corrected poses with its own arm; or what is left is 30
-/// times the stated sigma. `kWarning`: 3 times the sigma or less than half of it, too few poses, poses approached from
-/// one side, doubts of the cell file (cell_doubts.h). `kInfo`: a robot file that was not confirmed, error sources
-/// without effect, a bias that was learned with a tool that has moved since, what changed between sessions.
+/// times the stated sigma. `kWarning`: 3 times the sigma, a bias beside less than half of it, too few poses, poses
+/// approached from one side, doubts of the cell file (cell_doubts.h). `kInfo`: a robot file that was not confirmed,
+/// error sources without effect, a bias that was learned with a tool that has moved since, what changed between
+/// sessions.
 [[nodiscard]] std::vector<Note> notes_of(const CompensatedModel& model);
 
 /// The first note that keeps the model from being put in force by itself.

@@ -121,6 +121,7 @@ TEST(ModelNotes, AStatedSigmaOfMoreThanTwiceWhatIsLeftIsSaidToHideTheArmsErrors)
     parts.training.coverage_95_stated = inside;
     const double fitted = 1 - parts.rank / (3.0 * poses);
     parts.training.calibrated.rms = times * std::sqrt(3.0 * fitted) * parts.physics.cell->tracker.sigma;
+    parts.discrepancy = times * parts.physics.cell->tracker.sigma;
     const std::vector<Note> notes = notes_of(test::demand(CompensatedModel::make(parts)));
     return std::any_of(notes.begin(), notes.end(), [](const Note& note) { return note.code == "sigma_overstated"; });
   };

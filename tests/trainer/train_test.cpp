@@ -2,10 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <random>
 
 #include "server/base/units.h"
 #include "server/compensate/model_file.h"
+#include "server/compensate/model_notes.h"
 #include "server/measurement/checked_batch.h"
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
@@ -266,6 +269,36 @@ TEST(Train, AutoLeavesTheBiasOfOrientationsOutWhereTheyDoNotGain) {
   EXPECT_FALSE(parts.rotation_bias);
   EXPECT_NE(parts.bias_choice->sentence.find("of the orientations it explains nothing"), std::string::npos)
       << parts.bias_choice->sentence;
+}
+
+/// m per axis: what a model says that it errs by, rms over fresh poses; and whether it says that its sigma is too
+/// large.
+std::pair<double, bool> promised(const CompensatedModel& model, const VirtualRobot& robot) {
+  std::vector<PoseContext> fresh;
+  for (const Measurement& m : test::measured(robot, 60, 900, false).measurements) fresh.push_back(m.context);
+  double sum = 0;
+  for (const ErrorPrediction& one : model.predict_all(fresh)) sum += one.true_stddev_B.squaredNorm();
+  const std::vector<Note> notes = notes_of(model);
+  const bool said = std::any_of(notes.begin(), notes.end(), [](const Note& note) {
+    return note.code == "sigma_overstated" && note.severity == Note::Severity::kInfo;
+  });
+  return {std::sqrt(sum / (3.0 * static_cast<double>(fresh.size()))), said};
+}
+
+TEST(Train, WhatAnOverstatedSigmaHidesIsPromisedAsTheArmsErrorAndSaidWhereItChangesAPromise) {
+  auto cell = std::make_shared<Cell>(*test::cell_7());
+  const VirtualRobot robot = test::chapter_5_robot(cell);  // its tracker is as good as it is
+  const MeasurementBatch good = test::measured(robot, 400, 5, false);
+  MeasurementBatch bent = good;  // as no cause bends it
+  for (Measurement& m : bent.measurements)
+    m.p_W += 1.2e-4 * Vector3(std::sin(7 * m.context.q(1)), std::cos(6 * m.context.q(2)), std::sin(8 * m.context.q(0)));
+  cell->tracker.sigma *= 25;
+  const auto [hidden, said] = promised(test::demand(train(cell, bent, quick("M3", "none"))), robot);
+  EXPECT_GT(to_mm(hidden), 0.08) << "the arm errs by as much";
+  EXPECT_TRUE(said);
+  const auto [none, said_of_none] = promised(test::demand(train(cell, good, quick("M3", "none"))), robot);
+  EXPECT_LT(to_mm(none), 0.12);
+  EXPECT_FALSE(said_of_none) << "the parameters are promised with more than that";
 }
 
 TEST(Train, ABiasThatCannotBeSpelledIsRefusedInTheSpellersWords) {

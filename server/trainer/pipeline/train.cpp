@@ -10,6 +10,7 @@
 #include "server/calibrate/identify_sessions.h"
 #include "server/calibrate/orientation_check.h"
 #include "server/compensate/budget/error_budget.h"
+#include "server/compensate/hidden_error.h"
 #include "server/compensate/world.h"
 #include "server/measurement/gauges.h"
 #include "server/measurement/repeats.h"
@@ -92,11 +93,26 @@ void record_training(CompensatedModel::Parts& parts, const CheckedBatch& batch, 
   record_stamp(parts, batch, options);
 }
 
+/// Adds the model's figures on the poses that it was trained on.
+Status add_training_figures(CompensatedModel::Parts& parts, const MeasurementBatch& train) {
+  const Result<CompensatedModel> bare = CompensatedModel::make(parts);
+  if (!bare) return tl::make_unexpected(bare.error());
+  parts.training = bare->evaluate(train);
+  return {};
+}
+
 /// The model with its figures on the poses it was trained on and on those held out.
 Result<CompensatedModel> validated(CompensatedModel::Parts parts, const BatchSplit& split) {
-  const Result<CompensatedModel> bare = CompensatedModel::make(parts);
+  if (const Status added = add_training_figures(parts, split.train); !added) return tl::make_unexpected(added.error());
+  Result<CompensatedModel> bare = CompensatedModel::make(parts);
   if (!bare) return bare;
-  parts.training = bare->evaluate(split.train);
+  if (const double hidden = hidden_by_sigma(*bare); hidden > parts.discrepancy) {
+    parts.discrepancy = hidden;
+    if (const Status added = add_training_figures(parts, split.train); !added)
+      return tl::make_unexpected(added.error());
+    bare = CompensatedModel::make(parts);
+    if (!bare) return bare;
+  }
   parts.budget.reset();
   if (has_positions(split.train)) parts.budget = error_budget(*bare, split.train);
   parts.validation.reset();
