@@ -25,6 +25,25 @@ std::string kind_in_words(const Cause& cause) {
   return in_words(Cause{.cause = cause.cause, .parameter = cause.parameter});
 }
 
+namespace {
+
+bool may_show_what_lacks(const Cause& cause, bool is_in_doubt) {
+  const CauseRecord* record = find_cause(cause.cause);
+  return is_in_doubt && record != nullptr && record->search == causes::SearchFamily::kPose;
+}
+
+constexpr const char* kMissed = "pose that the simulation misses";
+
+}  // namespace
+
+std::string called(const Cause& cause, bool is_in_doubt) {
+  return may_show_what_lacks(cause, is_in_doubt) ? fmt::format("{}, pose {}", kMissed, cause.pose_id) : in_words(cause);
+}
+
+std::string kind_called(const Cause& cause, bool is_in_doubt) {
+  return may_show_what_lacks(cause, is_in_doubt) ? kMissed : kind_in_words(cause);
+}
+
 Cause cause_at(const CauseRecord& record, int joint) {
   Cause cause;
   cause.cause = record.spelling;

@@ -33,6 +33,10 @@ struct Cause {
 [[nodiscard]] std::string in_words(const Cause& cause);
 /// The same without its joint and pose, where a table has columns for them.
 [[nodiscard]] std::string kind_in_words(const Cause& cause);
+/// What a finding is called, all of it or without joint and pose. A pose that is out and may show what the simulation
+/// lacks is no bad one.
+[[nodiscard]] std::string called(const Cause& cause, bool is_in_doubt);
+[[nodiscard]] std::string kind_called(const Cause& cause, bool is_in_doubt);
 /// What is known of it, wherever on the arm it is.
 [[nodiscard]] const CauseRecord& record_of(const Cause& cause);
 /// The cause of that record, of `joint` (0-based; -1: of no single one).

@@ -86,8 +86,9 @@ std::string others_of(const Finding& finding) {
 HtmlRow finding_row(const Finding& finding) {
   const std::string others = others_of(finding);
   return {
-      .cells = {"<b>" + html_text(kind_in_words(finding.cause)) + "</b>", html_text(where_of(finding.cause)),
-                estimates_of(finding), fmt::format("{:.3g}", finding.effect_rms * 1e6),
+      .cells = {"<b>" + html_text(kind_called(finding.cause, !finding.could_also_be.empty())) + "</b>",
+                html_text(where_of(finding.cause)), estimates_of(finding),
+                fmt::format("{:.3g}", finding.effect_rms * 1e6),
                 millimetres(finding.held_out_before.rms) + "\u00a0→\u00a0" + millimetres(finding.held_out_after.rms),
                 fmt::format("{:.0f}", finding.strength), p_value_shown(finding.p_value),
                 others.empty() ? "no other known cause" : "<span class=\"doubt\">" + html_text(others) + "</span>"},

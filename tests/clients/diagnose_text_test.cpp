@@ -56,6 +56,17 @@ TEST(DiagnoseText, SaysWhatWouldNotHaveBeenNamedForCertainAndHowLargeTheNoiseIs)
   }
 }
 
+TEST(DiagnoseText, APoseThatMayShowWhatTheSimulationLacksIsNotCalledABadOne) {
+  Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
+  Finding out{.cause = {.cause = "outlier", .pose_id = "p9"}, .effect_rms = 1e-3};
+  diagnosis.findings = {out};
+  EXPECT_NE(diagnosis_text(diagnosis_json(diagnosis)).find("single bad pose, pose p9"), std::string::npos);
+  diagnosis.findings.front().could_also_be = {unknown_cause()};
+  const std::string text = diagnosis_text(diagnosis_json(diagnosis));
+  EXPECT_EQ(text.find("bad pose"), std::string::npos) << text;
+  EXPECT_NE(text.find("pose that the simulation misses, pose p9"), std::string::npos) << text;
+}
+
 TEST(DiagnoseText, NextPosesAreAPlanThatTheOtherCommandsRead) {
   const Diagnosis diagnosis = test::made_up_diagnosis(test::cell_7());
   const JointList plan = test::demand(parse_joint_csv(next_poses_csv(diagnosis_json(diagnosis)), "next.csv"));

@@ -66,10 +66,15 @@ std::string p_text(const ordered_json& value) {
   return p <= kLeastPValue ? "< 1e-6" : fmt::format("{:.2g}", p);
 }
 
+/// What the finding is called, `single bad pose, pose p28` or, in doubt, something less.
+std::string name_of(const ordered_json& finding) {
+  return called(cause_of(finding), !finding.at("could_also_be").empty());
+}
+
 /// `width`: of the column of causes.
 std::string finding_lines(const ordered_json& finding, std::size_t width) {
   std::string text =
-      fmt::format("  {:<{}}{:>10.1f}{:>10.0f}{:>10}{:>10.4f}{:>10.4f}\n", cause_text(finding), width,
+      fmt::format("  {:<{}}{:>10.1f}{:>10.0f}{:>10}{:>10.4f}{:>10.4f}\n", name_of(finding), width,
                   kMicrometres * finding.at("effect_rms_mm").get<double>(), finding.at("strength").get<double>(),
                   p_text(finding.at("p_value")), finding.at("held_out").at("before").at("rms_mm").get<double>(),
                   finding.at("held_out").at("after").at("rms_mm").get<double>());
@@ -91,7 +96,7 @@ std::string finding_lines(const ordered_json& finding, std::size_t width) {
 std::string findings_table(const ordered_json& findings) {
   if (findings.empty()) return "";
   std::size_t width = 34;
-  for (const ordered_json& finding : findings) width = std::max(width, cause_text(finding).size() + 1);
+  for (const ordered_json& finding : findings) width = std::max(width, name_of(finding).size() + 1);
   constexpr auto kColumns = "  {:<{}}{:>10}{:>10}{:>10}{:>10}{:>10}\n";
   std::string text = "\n" + fmt::format(kColumns, "", width, "effect", "strength", "p", "held out", "") +
                      fmt::format(kColumns, "cause", width, "um rms", "lambda", "", "before mm", "after mm");
