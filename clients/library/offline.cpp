@@ -26,6 +26,7 @@
 #include "server/report/diagnosis_json.h"
 #include "server/robot/inverse_kinematics.h"
 #include "server/simulate/simulate.h"
+#include "server/trainer/pipeline/extend.h"
 #include "server/trainer/pipeline/first_batch.h"
 #include "server/trainer/pipeline/train.h"
 
@@ -405,6 +406,35 @@ Result<std::string> diagnose(const Cell& cell, std::span<const Batch> batches, c
   const auto found = trammel::diagnose(cell.inside().cell, *batch, how);
   if (!found) return passed_on(found);
   return diagnosis_json(*found).dump(2);
+}
+
+Result<Extension> extend(const Cell& cell, std::span<const Batch> batches, const DiagnoseOptions& options) {
+  constexpr double kDiagnosisShare = 0.6;  // of the work
+  const auto fits = trainable(cell, {});
+  if (!fits) return passed_on(fits);
+  const std::shared_ptr<const trammel::Cell>& of = cell.inside().cell;
+  const auto batch = checked(batches, *of, held_out_to_extend(options.seed));
+  if (!batch) return passed_on(batch);
+  trammel::DiagnoseOptions how;
+  how.seed = options.seed;
+  how.progress = [&](const std::string& stage, double share) {
+    return goes_on(options.progress, stage, kDiagnosisShare * share);
+  };
+  const auto found = trammel::diagnose(of, *batch, how);
+  if (!found) return tl::make_unexpected(to_api(with_rows_set_aside(found.error(), *batch)));
+  trammel::TrainOptions training;
+  training.seed = options.seed;
+  training.trained_at = unix_now();
+  training.progress = [&](const std::string& stage, double share) {
+    return goes_on(options.progress, stage, kDiagnosisShare + (1 - kDiagnosisShare) * share);
+  };
+  auto extended = applied(of, *batch, *found, training);
+  if (!extended) return passed_on(extended);
+  Extension told{diagnosis_json(*found).dump(2), {}, {}, extended->why_not};
+  if (!told.why_not.empty()) return told;
+  told.error_sources = std::move(extended->extension->lasting);
+  told.model = Model(std::make_shared<const Model::Inside>(Model::Inside{std::move(extended->extension->after)}));
+  return told;
 }
 
 namespace {

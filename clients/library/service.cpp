@@ -221,9 +221,9 @@ Result<std::int64_t> Session::retrain(const std::string& cell, const std::vector
   return *job;
 }
 
-Result<std::int64_t> Session::diagnose(const std::string& cell, const std::string& batch_id,
-                                       const std::string& csv) const {
-  const auto job = inside_->session->diagnose(cell, batch_id, csv, false);
+Result<std::int64_t> Session::diagnose(const std::string& cell, const std::string& batch_id, const std::string& csv,
+                                       bool apply) const {
+  const auto job = inside_->session->diagnose(cell, batch_id, csv, apply);
   if (!job) return passed_on(job);
   return *job;
 }

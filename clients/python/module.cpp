@@ -434,6 +434,16 @@ void add_work(py::module_& m) {
       },
       "cell"_a, "batches"_a, "seed"_a, "progress"_a);
   m.def(
+      "extend",
+      [](const api::Cell& cell, const std::vector<api::Batch>& batches, std::uint64_t seed,
+         const py::object& progress) {
+        const api::Extension found = told_of(progress, [&](api::Progress told) {
+          return api::extend(cell, batches, {seed, std::move(told)});
+        });
+        return py::make_tuple(found.findings, found.model, found.error_sources, found.why_not);
+      },
+      "cell"_a, "batches"_a, "seed"_a, "progress"_a);
+  m.def(
       "plan",
       [](const api::Cell& cell, std::size_t count, std::uint64_t seed, std::string criterion, bool positions_only) {
         const api::PlanOptions options{count, seed, std::move(criterion), positions_only};
@@ -544,10 +554,9 @@ void add_session_care(py::class_<Session>& session) {
           "cell"_a, "batch_ids"_a, "level"_a, "bias"_a)
       .def(
           "diagnose",
-          [](const Session& s, const std::string& cell, const std::string& batch_id, const std::string& csv) {
-            return value_or_raise(unlocked([&] { return s.diagnose(cell, batch_id, csv); }));
-          },
-          "cell"_a, "batch_id"_a, "csv"_a)
+          [](const Session& s, const std::string& cell, const std::string& batch_id, const std::string& csv,
+             bool apply) { return value_or_raise(unlocked([&] { return s.diagnose(cell, batch_id, csv, apply); })); },
+          "cell"_a, "batch_id"_a, "csv"_a, "apply"_a)
       .def(
           "check",
           [](const Session& s, const std::string& cell, const std::string& batch_id, const std::string& csv,

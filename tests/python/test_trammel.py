@@ -677,10 +677,22 @@ class Guards(unittest.TestCase):
         path.write_text(text.getvalue())
         return path, trammel.Batch.parse(text.getvalue(), name)
 
+    @staticmethod
+    def run_program(*command):
+        """Exit code, and all that it said."""
+        done = subprocess.run([str(part) for part in command], capture_output=True, text=True)
+        return done.returncode, done.stdout + done.stderr
+
     def at_the_command_line(self, path):
-        done = subprocess.run([BUILD / "clients/trammel", "train", "--cell", self.path, "--batch", path, "-o",
-                               self.folder / "m.model", "--json", self.folder / "m.json"], capture_output=True, text=True)
-        return done.returncode, done.stderr
+        return self.run_program(BUILD / "clients/trammel", "train", "--cell", self.path, "--batch", path, "-o",
+                                self.folder / "m.model", "--json", self.folder / "m.json")
+
+    def applied_at_the_command_line(self, path):
+        return self.run_program(BUILD / "clients/trammel", "diagnose", "--cell", self.path, "--batch", path, "--apply", "--cell-out",
+                                self.folder / "extended.yaml", "--model", self.folder / "extended.model")
+
+    def at_the_library(self, what, path):
+        return self.run_program(BUILD / "tests/trammel_library_door", what, self.path, path)
 
     def words_of_the_service(self, batch):
         """Why it learns nothing from the batch: it is refused when it is handed in, or kept in quarantine."""
@@ -691,9 +703,16 @@ class Guards(unittest.TestCase):
         self.assertEqual(ended["verdict"], "quarantined", ended)
         return ended["what"]
 
-    def test_a_batch_that_is_refused_is_refused_at_every_door_in_the_same_words(self):
+    def ten_bad_batches(self):
+        """Each as a file and as a batch, by name."""
         later = len(self.good) // 2
         following = lambda i: self.good[(i + 1) % len(self.good)]
+
+        def longer_tool(i, row):  # 30 mm along its own axis
+            w, x, y, z = (float(row[name]) for name in ("qw", "qx", "qy", "qz"))
+            axis = np.array([2 * (x * z + w * y), 2 * (y * z - w * x), w * w - x * x - y * y + z * z])
+            return {name: float(row[name]) + 30 * along for name, along in zip(("x_mm", "y_mm", "z_mm"), axis)}
+
         mistakes = {
             "mirrored": lambda i, row: {"y_mm": -float(row["y_mm"])},
             "exchanged": lambda i, row: {"x_mm": row["z_mm"], "z_mm": row["x_mm"]},
@@ -704,17 +723,42 @@ class Guards(unittest.TestCase):
             "joints": lambda i, row: {"q4_deg": row["q5_deg"], "q5_deg": row["q4_deg"]},
             "zero-2": lambda i, row: {"q2_deg": float(row["q2_deg"]) + (0.2 if i >= later else 0)},
             "zero-3": lambda i, row: {"q3_deg": float(row["q3_deg"]) + (0.2 if i >= later else 0)},
+            "tool": longer_tool,
         }
-        for name, mistake in mistakes.items():
+        return {name: self.batch(name, mistake) for name, mistake in mistakes.items()}
+
+    def test_a_batch_that_is_refused_is_refused_at_every_door_in_the_same_words(self):
+        for name, (path, batch) in self.ten_bad_batches().items():
             with self.subTest(name):
-                path, batch = self.batch(name, mistake)
                 with self.assertRaises(trammel.Refused) as raised:
                     trammel.train(self.cell, batch)
                 words = raised.exception.message
-                code, said = self.at_the_command_line(path)
-                self.assertNotEqual(code, 0)
-                self.assertIn(words, said)
+                self.assertEqual(raised.exception.code, "refused")
+                for code, said in (self.at_the_command_line(path), self.at_the_library("train", path)):
+                    self.assertEqual(code, 3, said)
+                    self.assertIn(words, said)
                 self.assertIn(words, self.words_of_the_service(batch))
+
+    def test_what_such_a_batch_shows_is_applied_at_every_door_or_at_none(self):
+        ends = set()
+        for name, (path, batch) in self.ten_bad_batches().items():
+            with self.subTest(name):
+                try:
+                    extension = trammel.extend(self.cell, batch)
+                    code, words = 0 if extension.model else 1, extension.why_not
+                except trammel.Refused as refused:
+                    code, words = 3, refused.message
+                ends.add(code)
+                for at_door, said in (self.applied_at_the_command_line(path), self.at_the_library("extend", path)):
+                    self.assertEqual(at_door, code, said)
+                    self.assertIn(words, said)
+                try:
+                    ended = self.session.extend("cell-7", batch, limit_s=300)
+                except trammel.Refused as refused:
+                    ended = {"stage": "failed", "what": refused.message, "in_force": False}
+                self.assertEqual((ended["stage"] == "failed", ended["in_force"]), (code == 3, code == 0), ended)
+                self.assertIn(words, ended["what"])
+        self.assertEqual(ends, {1, 3}, "some are refused, and what the others show is not applied")
 
     def test_a_model_that_leaves_hundreds_of_sigma_waits_for_a_person_at_every_door(self):
         def bent(i, row):  # as no cause bends it

@@ -36,8 +36,8 @@ Result<Diagnosis> run_diagnosis(const std::shared_ptr<const Cell>& cell, const C
   return diagnose(cell, batch, options);
 }
 
-Result<Extension> run_extension(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
-                                const Diagnosis& diagnosis, std::uint64_t seed) {
+Result<Applied> run_extension(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+                              const Diagnosis& diagnosis, std::uint64_t seed) {
   ProgressLine progress;
   TrainOptions options;
   options.seed = seed;
@@ -46,7 +46,7 @@ Result<Extension> run_extension(const std::shared_ptr<const Cell>& cell, const C
     progress.show(stage, share);
     return true;
   };
-  return extend(cell, batch, diagnosis, options);
+  return applied(cell, batch, diagnosis, options);
 }
 
 /// Where the extended list goes.
@@ -70,27 +70,23 @@ std::string extension_written(const Extension& extension, const DiagnoseArgument
   return said;
 }
 
-/// What became of --apply: the extended model, or why the cell file and the model are as they were.
-struct Applied {
-  std::optional<Extension> extension = {};
-  std::string why_not = {};
-};
-
 /// Extends the model by the causes found. Writes it only where a service would put it in force.
 Result<Applied> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch, const Diagnosis& diagnosis,
                       const DiagnoseArguments& arguments, ordered_json& json, Outputs& outputs) {
-  if (const Status possible = check_can_extend(diagnosis); !possible) return Applied{{}, sentence(possible.error())};
-  Result<Extension> extension = run_extension(cell, batch, diagnosis, arguments.seed);
-  if (!extension) return tl::make_unexpected(extension.error());
-  json["applied"] = extension_json(*extension);
-  say(extension_text(*extension), arguments);
-  if (const std::string why_not = extension->why_not(); !why_not.empty())
-    return Applied{{}, fmt::format("cell {}: {}", cell->name, why_not)};
-  Result<std::string> text = with_error_sources(cell->cell_yaml, extension->lasting, arguments.cell);
+  Result<Applied> found = run_extension(cell, batch, diagnosis, arguments.seed);
+  if (!found || !found->extension) return found;
+  const Extension& extension = *found->extension;
+  json["applied"] = extension_json(extension);
+  say(extension_text(extension), arguments);
+  if (!found->why_not.empty()) {
+    found->why_not = fmt::format("cell {}: {}", cell->name, found->why_not);
+    return found;
+  }
+  Result<std::string> text = with_error_sources(cell->cell_yaml, extension.lasting, arguments.cell);
   if (!text) return tl::make_unexpected(text.error());
   outputs.put(kCellOption, std::move(*text));
-  outputs.put("--model", serialize(extension->after));
-  return Applied{std::move(*extension)};
+  outputs.put("--model", serialize(extension.after));
+  return found;
 }
 
 /// The batch to diagnose. With --apply some rows are held out, to judge the extended model.
@@ -101,7 +97,7 @@ Result<CheckedBatch> batch_to_diagnose(const DiagnoseArguments& arguments, const
 
 /// Says what was applied, or why nothing was.
 Extent tell_applied(const Applied& applied, const DiagnoseArguments& arguments) {
-  if (applied.extension) {
+  if (applied.why_not.empty()) {
     say(extension_written(*applied.extension, arguments), arguments);
     return Extent::kAll;
   }

@@ -210,6 +210,18 @@ struct DiagnoseOptions {
 [[nodiscard]] TRAMMEL_API Result<std::string> diagnose(const Cell& cell, std::span<const Batch> batches,
                                                        const DiagnoseOptions& options = {});
 
+/// What extending a cell by what a diagnosis found is worth.
+struct Extension {
+  std::string findings;                    ///< the diagnosis, as diagnose() writes it
+  std::optional<Model> model;              ///< the extended model; empty where it is not to be applied
+  std::vector<std::string> error_sources;  ///< of it, those that belong into the cell file
+  std::string why_not;                     ///< why nothing is applied, in the words of every door; empty: apply it
+};
+/// What `trammel diagnose --apply` does, without writing anything: some rows are set aside before the batch is looked
+/// at, the cell is extended by what is found, and the model is one to apply where a service would put it in force.
+[[nodiscard]] TRAMMEL_API Result<Extension> extend(const Cell& cell, std::span<const Batch> batches,
+                                                   const DiagnoseOptions& options = {});
+
 /// How to plan.
 struct PlanOptions {
   std::size_t count = 0;          ///< number of poses

@@ -101,9 +101,10 @@ class TRAMMEL_API Session {
   [[nodiscard]] Result<std::int64_t> retrain(const std::string& cell, const std::vector<std::string>& batch_ids = {},
                                              const std::string& level = {}, const std::string& bias = {}) const;
   /// Asks what the cell's model lacks by a stored batch (its id; empty: the newest) or, with `csv`, by measurements
-  /// that are not kept. Returns the job; once it is done, findings() has what `trammel diagnose --json` prints.
+  /// that are not kept. Returns the job; once it is done, findings() has what `trammel diagnose --json` prints. With
+  /// `apply` a model with the causes found is trained, and put in force if it is better.
   [[nodiscard]] Result<std::int64_t> diagnose(const std::string& cell, const std::string& batch_id = {},
-                                              const std::string& csv = {}) const;
+                                              const std::string& csv = {}, bool apply = false) const;
   /// Asks whether the robot is still as its model in force has it, by a few poses, stored or in `csv`. `tolerance_mm`
   /// instead of what the cell holds. Returns the job; then findings() has what `trammel check --json` prints.
   [[nodiscard]] Result<std::int64_t> check(const std::string& cell, const std::string& batch_id = {},

@@ -1,6 +1,6 @@
 """Trammel: an industrial robot lands where it was told to.
 
-Offline, on files:  `Cell`, `Batch`, `Model`, `train`, `diagnose`, `plan`, `simulate`.
+Offline, on files:  `Cell`, `Batch`, `Model`, `train`, `diagnose`, `extend`, `plan`, `simulate`.
 A running service:  `Session`.
 What goes wrong:    `TrammelError` and its kinds, with code, file, row, column, value and limit.
 
@@ -16,7 +16,7 @@ import dataclasses
 import io
 import json
 import os
-from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, TypeVar, Union
+from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple, TypeVar, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = [
-    "Batch", "Busy", "Cell", "Conflict", "Corrections", "Internal", "Model", "NotFound", "Plan", "Predictions", "Refused",
-    "Session", "TooLarge", "TrammelError", "Unreachable", "Usage", "diagnose", "plan", "simulate", "train",
+    "Batch", "Busy", "Cell", "Conflict", "Corrections", "Extension", "Internal", "Model", "NotFound", "Plan", "Predictions", "Refused",
+    "Session", "TooLarge", "TrammelError", "Unreachable", "Usage", "diagnose", "extend", "plan", "simulate", "train",
 ]
 
 Path = Union[str, "os.PathLike[str]"]
@@ -463,6 +463,22 @@ def diagnose(cell: Cell, batches: Batches, seed: int = 1, progress: Optional[Pro
     return found
 
 
+class Extension(NamedTuple):
+    """What extending a cell by what a diagnosis found is worth."""
+
+    findings: Dict[str, Any]  # as `diagnose()` returns them
+    model: Optional[Model]  # the extended model; None where it is not to be applied
+    error_sources: List[str]  # of it, those that belong into the cell file
+    why_not: str  # why nothing is applied, in the words of every door; empty: apply it
+
+
+def extend(cell: Cell, batches: Batches, seed: int = 1, progress: Optional[Progress] = None) -> Extension:
+    """What `trammel diagnose --apply` does, without writing anything: some rows are set aside before the batch is looked at,
+    the cell is extended by what is found, and the model is one to apply where a service would put it in force."""
+    findings, model, error_sources, why_not = _trammel.extend(_inside_cell(cell), _inside_of(batches), whole(seed, "seed"), progress)
+    return Extension(json.loads(findings), None if model is None else Model(model), error_sources, why_not)
+
+
 def plan(cell: Cell, count: int, seed: int = 1, criterion: str = "lhs", positions_only: bool = False) -> Plan:
     """`count` poses to measure, inside the cell's workspace and in sight of its tracker. `criterion`: `lhs`,
     `observability`, `separate:CAUSE,CAUSE`, `check`. `positions_only`: for a single reflector."""
@@ -534,10 +550,15 @@ class Session:
         """Trains from stored batches (none: the newest) and returns the job. `level` and `bias` instead of the cell's."""
         return self._inside.retrain(cell, list(batch_ids), level, bias)
 
+    def extend(self, cell: str, batch: Union[Batch, str] = "", limit_s: float = 600.0) -> Dict[str, Any]:
+        """What `trammel diagnose --apply` does at the service: the model with the causes that `batch` shows is put in force if
+        it is better. Waits; the job as in `wait_for()`. `batch` as in `diagnose()`."""
+        return self.wait_for(self._inside.diagnose(cell, *_id_and_text(batch), True), limit_s)
+
     def diagnose(self, cell: str, batch: Union[Batch, str] = "", limit_s: float = 600.0) -> Dict[str, Any]:
         """What the cell's model lacks, with the keys of `trammel diagnose --json`. `batch`: the id of a stored one (empty:
         the newest), or measurements, which are not kept. Waits; raises `Refused` with the reason where the job fails."""
-        job = self._inside.diagnose(cell, *_id_and_text(batch))
+        job = self._inside.diagnose(cell, *_id_and_text(batch), False)
         return self._findings(cell, job, limit_s)
 
     def check(self, cell: str, batch: Union[Batch, str] = "", tolerance_mm: Optional[float] = None,

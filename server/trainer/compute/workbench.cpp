@@ -246,6 +246,11 @@ Result<Made> Workbench::extended(const CheckedBatch& batch, const std::vector<st
     made.message = "nothing applied: " + made.outcome.why;
     return made;
   }
+  if (!in_force_) {
+    auto without = model_without(task_.cell, own, batch, options);
+    if (!without) return tl::make_unexpected(without.error());
+    without_ = std::make_shared<const ServedModel>(task_.cell->name, 0, std::move(*without));
+  }
   auto found = batches_.sessions_of_diagnosis();
   if (!found) return tl::make_unexpected(found.error());
   MeasurementBatch& own_judges = found->sessions[found->own].judges;
@@ -291,6 +296,8 @@ Result<GateVerdict> Workbench::judge(const Opponents& opponents) {
     if (!model) return tl::make_unexpected(model.error());
     present = std::make_shared<const ServedModel>(std::move(*model));
   }
+  // The first model of its cell is held against the same without what was found, as on files.
+  if (!opponents.in_force && !opponents.record) present = without_;
   std::vector<ServedModel> before;
   for (const ModelText& text : opponents.served_before) {
     if (before.size() >= opponents.most_before) break;

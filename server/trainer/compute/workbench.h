@@ -48,6 +48,7 @@ class Workbench : public Computing {
   JobBatches batches_;
   std::shared_ptr<const ServedModel> in_force_;  // once it was asked for
   std::optional<CompensatedModel> candidate_;    // once it is made
+  std::shared_ptr<const ServedModel> without_;   // beside an extended one, where none is in force: the same without
   std::vector<JudgingSession> sessions_;         // that judge it, oldest first
 };
 

@@ -29,8 +29,10 @@ TrainOptions as_part(TrainOptions options, double from, double to) {
   return options;
 }
 
+/// From a batch that the diagnosis has looked at: another tool, which a training refuses, may be what it found.
 Result<CompensatedModel> trained(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                  const std::vector<std::string>& sources, TrainOptions options) {
+  options.looked_at = true;
   options.level = level_of(sources);
   return train(cell, batch, options);
 }
@@ -152,6 +154,20 @@ Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const CheckedB
   std::vector<std::string> lasting = lasting_sources(after->sources);
   return Extension{std::move(after->sources), std::move(lasting), std::move(*before),         std::move(after->model),
                    std::move(gain),           std::move(verdict), std::move(after->left_out), std::move(after->day)};
+}
+
+Result<Applied> applied(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch, const Diagnosis& diagnosis,
+                        const TrainOptions& options) {
+  if (const Status possible = check_can_extend(diagnosis); !possible) return Applied{{}, sentence(possible.error())};
+  return extend(cell, batch, diagnosis, options).map([](Extension extension) {
+    std::string why_not = extension.why_not();
+    return Applied{std::move(extension), std::move(why_not)};
+  });
+}
+
+Result<CompensatedModel> model_without(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& own,
+                                       const CheckedBatch& batch, const TrainOptions& options) {
+  return trained(cell, batch, own, options);
 }
 
 std::string Extension::why_not() const {

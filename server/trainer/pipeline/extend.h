@@ -65,6 +65,20 @@ struct Extension {
 [[nodiscard]] Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                        const Diagnosis& diagnosis, const TrainOptions& options);
 
+/// What became of what a diagnosis found.
+struct Applied {
+  std::optional<Extension> extension;  ///< empty: there was nothing to extend by
+  std::string why_not;                 ///< why nothing is to be applied, in the words of every door; empty: apply it
+};
+/// extend(), where the diagnosis found something.
+[[nodiscard]] Result<Applied> applied(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+                                      const Diagnosis& diagnosis, const TrainOptions& options);
+
+/// A model of the sources in `own` alone: what an extended one is held against where no other model is in force.
+[[nodiscard]] Result<CompensatedModel> model_without(const std::shared_ptr<const Cell>& cell,
+                                                     const std::vector<std::string>& own, const CheckedBatch& batch,
+                                                     const TrainOptions& options);
+
 /// `error` of diagnosing `batch`, and how many of its rows are set aside: they are not among those diagnosed.
 [[nodiscard]] Error with_rows_set_aside(Error error, const CheckedBatch& batch);
 
