@@ -24,7 +24,7 @@ Status take_up_again(Database& database, const std::string& place) {
   const Status in_use = check_not_moved(database, place);
   if (in_use) return refused("was not moved").in(place).next("start its services");
   if (in_use.error().field != kMovedField) return in_use;
-  record_audit(database, {"", kReopened, "store", "", place});
+  record_audit(database, {"", kReopenedRow, "store", "", place});
   transaction.commit();
   return {};
 }
@@ -37,7 +37,7 @@ Status check_not_moved(Database& database, const std::string& place) {
   try {
     if (!database.has_table("audit")) return {};
     Rows last = prepare(database, "SELECT what, at, after FROM audit ORDER BY number DESC LIMIT 1");
-    if (!last.next() || last.text(0) != kMoved) return {};
+    if (!last.next() || last.text(0) != kMovedRow) return {};
     at = last.integer64(1);
     to = last.text(2);
   } catch (const DatabaseError& error) {
@@ -51,7 +51,7 @@ Status check_not_moved(Database& database, const std::string& place) {
                         place));
 }
 
-void record_move(Database& database, const std::string& to) { record_audit(database, {"", kMoved, "store", "", to}); }
+void record_move(Database& database, const std::string& to) { record_audit(database, {"", kMovedRow, "store", "", to}); }
 
 Status reopen_store(const std::string& place) {
   const std::string said = spoken_place(place);
