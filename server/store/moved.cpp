@@ -51,7 +51,9 @@ Status check_not_moved(Database& database, const std::string& place) {
                         place));
 }
 
-void record_move(Database& database, const std::string& to) { record_audit(database, {"", kMovedRow, "store", "", to}); }
+void record_move(Database& database, const std::string& to) {
+  record_audit(database, {"", kMovedRow, "store", "", to});
+}
 
 Status reopen_store(const std::string& place) {
   const std::string said = spoken_place(place);
