@@ -224,7 +224,7 @@ Lost at_elbows(const CompensatedModel& model, bool orientation, int poses, int w
     const test::Remastered world = test::draw_remastered(test::sets_of_seven_axes(), random);
     apply(world, check, random);
     const CheckedBatch batch =
-        test::demand(check_against_cell(measured(test::iiwa(), check), model.cell(), drawn(0, 1)));
+        test::demand(check_against_cell(measured(test::iiwa(), check), model.cell(), trammel::drawn(0, 1)));
     lost.add(kind, world, check_health(model, batch, {}));
   }
   lost.tell(kind);
