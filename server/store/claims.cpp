@@ -124,11 +124,13 @@ Status Store::ask_to_cancel(std::int64_t job, const ChangeId& by) {
 
 Result<std::set<std::int64_t>> Store::jobs_to_take() const {
   return connection_->exclusively([&](Database& database) -> Result<std::set<std::int64_t>> {
-    auto rows = prepare(database,
-                        "SELECT id FROM jobs WHERE state IN ('queued', 'running') AND NOT EXISTS "
-                        "(SELECT 1 FROM jobs AS other JOIN job_claims ON job = other.id WHERE other.cell = jobs.cell "
-                        "AND other.state = 'running' AND (other.id = jobs.id OR token <> $1) AND lease_until > $2)",
-                        connection_->worker.token, now_of(database));
+    // The few that are worked on are looked for once, and not for each that waits.
+    constexpr const char* kToTake =
+        "WITH alive AS (SELECT id, cell, token FROM jobs JOIN job_claims ON job = id "
+        "WHERE state = 'running' AND lease_until > $1) "
+        "SELECT id FROM jobs WHERE state IN ('queued', 'running') AND id NOT IN (SELECT id FROM alive) "
+        "AND cell NOT IN (SELECT cell FROM alive WHERE token <> $2)";
+    auto rows = prepare(database, kToTake, now_of(database), connection_->worker.token);
     std::set<std::int64_t> jobs;
     while (rows.next()) jobs.insert(rows.integer64(0));
     return jobs;

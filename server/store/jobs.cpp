@@ -345,12 +345,17 @@ Result<std::vector<StoredJob>> Store::unfinished_jobs() const {
 }
 
 Result<std::vector<StoredJob>> Store::recent_jobs(const std::string& cell, int finished) const {
+  // Each part by its own index: one condition for all three would read every job that ever was.
+  const auto last = [](const char* state) {
+    return fmt::format(
+        " UNION ALL SELECT id FROM (SELECT id FROM jobs WHERE ($1 = '' OR cell = $1) AND state = '{0}' "
+        "ORDER BY id DESC LIMIT $2) AS last_{0}",
+        state);
+  };
   const std::string wanted = std::string(kJobColumns) +
-                             "WHERE ($1 = '' OR cell = $1) AND (state IN ('queued', 'running') "
-                             "OR id IN (SELECT id FROM jobs WHERE ($1 = '' OR cell = $1) AND state = 'done' "
-                             "ORDER BY id DESC LIMIT $2) "
-                             "OR id IN (SELECT id FROM jobs WHERE ($1 = '' OR cell = $1) AND state = 'failed' "
-                             "ORDER BY id DESC LIMIT $2)) ORDER BY id";
+                             "WHERE id IN (SELECT id FROM jobs WHERE ($1 = '' OR cell = $1) AND state IN ('queued', "
+                             "'running')" +
+                             last("done") + last("failed") + ") ORDER BY id";
   return connection_->exclusively([&](Database& database) -> Result<std::vector<StoredJob>> {
     return jobs_of(database, prepare(database, wanted.c_str(), cell, finished));
   });
