@@ -24,9 +24,8 @@ const std::array<Migration, 2>& migrations() {
             "INSERT INTO trammel_schema (version, works_from) VALUES (0, 0);"
             "INSERT INTO store_identity (id) VALUES (replace(CAST(gen_random_uuid() AS TEXT), '-', ''));",
         1},
-       {std::string(kTablesGone) +
-            "CREATE INDEX IF NOT EXISTS jobs_by_cell ON jobs (cell, id);"
-            "CREATE INDEX IF NOT EXISTS jobs_failed ON jobs (id) WHERE state = 'failed';",
+       {std::string(kTablesGone) + "CREATE INDEX IF NOT EXISTS jobs_by_cell ON jobs (cell, id);"
+                                   "CREATE INDEX IF NOT EXISTS jobs_failed ON jobs (id) WHERE state = 'failed';",
         2}}};
   return all;
 }
