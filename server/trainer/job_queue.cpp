@@ -88,12 +88,14 @@ bool JobQueue::is_removed(std::int64_t id) {
   return false;
 }
 
-bool JobQueue::has(std::int64_t id) const {
+std::set<std::int64_t> JobQueue::jobs() const {
   const MutexLock lock(mutex_);
-  const auto is_it = [id](const WaitingJob& job) { return job.id == id; };
-  return taken_ == id || std::any_of(waiting_.begin(), waiting_.end(), [&](const auto& cell) {
-           return std::any_of(cell.second.begin(), cell.second.end(), is_it);
-         });
+  std::set<std::int64_t> ids;
+  for (const auto& [cell, waiting] : waiting_) {
+    for (const WaitingJob& job : waiting) ids.insert(job.id);
+  }
+  if (taken_) ids.insert(*taken_);
+  return ids;
 }
 
 std::size_t JobQueue::size() const {

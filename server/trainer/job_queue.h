@@ -4,6 +4,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <set>
 #include <stop_token>
 #include <string>
 
@@ -51,8 +52,8 @@ class JobQueue {
   /// Takes a job that waits out of the queue; false: it does not wait here.
   [[nodiscard]] bool remove(std::int64_t id);
 
-  /// Whether it waits here, or its turn has come.
-  [[nodiscard]] bool has(std::int64_t id) const;
+  /// Those that wait here, and the one whose turn has come.
+  [[nodiscard]] std::set<std::int64_t> jobs() const;
   [[nodiscard]] std::size_t size() const;
   /// How many of the cell's were asked for.
   [[nodiscard]] std::size_t asked_for(const std::string& cell) const;

@@ -264,10 +264,12 @@ void Trainer::follow_jobs() {
     if (is_over || now.stage != known.stage || now.what != known.what) book_.report(now);
   }
   std::vector<std::string> notices;  // the start of a server says them
+  const std::set<std::int64_t> known = queue_.jobs();
   for (const std::int64_t id : *to_take) {
-    if (queue_.has(id)) continue;
+    if (known.contains(id)) continue;
     auto job = store_.job(id);
-    if (!job || !can_take_up(*job, notices).value_or(false)) continue;
+    const bool is_over = job && (job->state == JobState::kDone || job->state == JobState::kFailed);  // meanwhile
+    if (!job || is_over || !can_take_up(*job, notices).value_or(false)) continue;
     job->state = JobState::kQueued;
     enqueue(*job, was_asked_for(*job).value_or(true));
   }
