@@ -229,6 +229,7 @@ void shape(CdrWalk& walk, Of<Job>) {
   walk.wides(2);
   walk.list("batch_ids", MAX_BATCHES, kNumber, "batch", [&] { told(walk, "batch_ids"); });
   walk.wides(3);
+  told(walk, "server");
 }
 
 void shape(CdrWalk& walk, Of<ReadModelsReply>) {

@@ -308,6 +308,7 @@ int run(const Arguments& arguments) {
   ServerConfig& config = server.config;
   config.trainer.compute.program = {"/proc/self/exe", kComputeWord};  // this very file, also where it was replaced
   put_over(config, arguments);
+  config.trainer.self = ServerSelf::here(config.dds.program_version, config.serves, config.trainer.trains);
   if (arguments.check)
     return check(server, arguments.config, arguments.store ? StoreToCheck::kCopy : StoreToCheck::kOwn);
   if (!server.problems.empty()) return refuse_start(server.problems);

@@ -262,6 +262,7 @@ DatedJob from_wire(const wire::Job& job, const std::string& server) {
   dated.status = status_of(job);
   dated.server = server;
   dated.kind = text(job.kind());
+  dated.worker = job.server();
   dated.batches = job.batch_ids();
   dated.created_unix_s = job.created_unix_s();
   dated.started_unix_s = if_known(job.started_unix_s());

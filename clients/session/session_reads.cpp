@@ -72,6 +72,15 @@ Result<std::vector<DatedJob>> Session::jobs(const std::string& cell) {
   std::vector<std::pair<wire::Job, std::string>> told;
   for (const wire::ReadModelsReply& reply : *replies)
     add_new(told, reply.jobs(), reply.header().server().to_string(), is_same);
+  // Who works on a job knows best how far it is.
+  for (const wire::ReadModelsReply& reply : *replies) {
+    for (const wire::Job& job : reply.jobs()) {
+      if (job.server() != reply.header().server().to_string()) continue;
+      for (auto& [known, server] : told) {
+        if (is_same(known, job)) known = job;
+      }
+    }
+  }
   std::vector<DatedJob> jobs;
   for (const auto& [job, server] : told) jobs.push_back(from_wire(job, server));
   return jobs;

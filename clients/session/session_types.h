@@ -122,7 +122,8 @@ struct AuditText {
 /// A job with what was asked for and when; times are Unix time, s, empty: not yet, or not recorded.
 struct DatedJob {
   JobStatus status;
-  std::string server, kind;  ///< kind: `train diagnose check`
+  std::string server, kind;  ///< server: that told of it; kind: `train diagnose check`
+  std::string worker;        ///< server that works on it, or did; empty: none yet, or not recorded
   std::vector<std::string> batches;
   std::int64_t created_unix_s = 0;
   std::optional<std::int64_t> started_unix_s, finished_unix_s;

@@ -293,6 +293,7 @@ wire::Job to_wire(const Trainer::DatedJob& dated) {
   job.created_unix_s(dated.asked.created_at);
   job.started_unix_s(dated.asked.started_at.value_or(kNoTime));
   job.finished_unix_s(dated.asked.finished_at.value_or(kNoTime));
+  job.server(told(dated.asked.server, wire::MAX_ID));
   return job;
 }
 

@@ -367,7 +367,9 @@ class DdsService::Running {
     status.contract_version(wire::CONTRACT_VERSION);
     status.program_version(options_.program_version);
     status.state(state);
-    for (const auto& [name, cell] : trainer_.cells()) status.cells().push_back(name);
+    for (const auto& [name, cell] : trainer_.cells()) {
+      if (!trainer_.why_apart(name)) status.cells().push_back(name);
+    }
     status.models_in_force(static_cast<std::int32_t>(registry_.cells_served()));
     status.requests(core_.counts.requests + core_.counts.shed);
     status.refused(core_.counts.refused + core_.counts.shed);

@@ -10,6 +10,7 @@
 #include "server/report/fleet_json.h"
 #include "server/report/work_json.h"
 #include "server/store/audit_json.h"
+#include "server/store/servers_json.h"
 
 namespace trammel {
 namespace {
@@ -57,14 +58,10 @@ Result<CellHealth> health_in(const Store& store, const ModelRegistry& registry, 
   return health;
 }
 
-nlohmann::ordered_json record_json(const RecordState& record) {
-  nlohmann::ordered_json json = {{"kind", record.kind},
-                                 {"place", record.place},
-                                 {"reachable", record.reachable},
-                                 {"away_since_unix_s", nullptr},
-                                 {"survives", record.survives}};
-  if (record.away_since) json["away_since_unix_s"] = *record.away_since;
-  return json;
+/// The servers of the record; null while nobody can say.
+nlohmann::ordered_json servers_of(const Trainer& trainer) {
+  const auto servers = trainer.servers();
+  return servers ? servers_json(*servers) : nlohmann::ordered_json(nullptr);
 }
 
 Status check_fits(const std::string& what, std::size_t bytes) {
@@ -258,6 +255,7 @@ Result<ReadModelsReply> Handlers::health_of(const std::string& cell, std::int64_
   const nlohmann::ordered_json answer = {{"server", store_.server()},
                                          {"trains", trainer_.trains()},
                                          {"record", record_json(store_.record())},
+                                         {"servers", cell.empty() ? servers_of(trainer_) : nlohmann::ordered_json(nullptr)},
                                          {"cells", std::move(cells)}};
   reply.text(answer.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   if (const Status fits = check_fits("the health of cells", reply.text().size()); !fits)

@@ -48,6 +48,8 @@ Result<std::shared_ptr<const Cell>> SubjectFinder::cell(const wire::Context& con
 
 Result<Subject> SubjectFinder::find(const wire::Context& context) {
   if (const auto known = cell(context); !known) return tl::make_unexpected(known.error());
+  if (const auto why = trainer_.why_apart(context.cell()))
+    return failure(ErrorCode::kConflict, "{}", *why).of("cell").with_text(context.cell());
   const auto [in_force, comes] = registry_.ready(context.cell());
   if (comes) {  // a worker of the service does not wait for the disk
     return failure(ErrorCode::kBusy, "the model of cell {} is being loaded", context.cell())

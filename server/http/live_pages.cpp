@@ -152,11 +152,12 @@ Result<std::string> job_table(const Watched& server, const std::string& cell) {
     rows.push_back(
         {{html_link(job_address(job->id), std::to_string(job->id)), html_link(cell_address(job->cell), job->cell),
           kind_of(job->kind), batches_of(*job), html_time(job->created_at), html_time(job->finished_at),
+          job->server.empty() ? "–" : html_text(job->server),
           outcome_of(*job, now) +
               (has_findings(*job) ? "<br>" + html_link(job_address(job->id) + "/findings", "what it found") : "")},
          now ? "now" : ""});
   }
-  return table({"job", "cell", "what", "batches", "asked (UTC)", "ended (UTC)", "outcome"}, rows);
+  return table({"job", "cell", "what", "batches", "asked (UTC)", "ended (UTC)", "server", "outcome"}, rows);
 }
 
 Result<std::string> version_table(const Watched& server, const std::string& cell) {
@@ -244,9 +245,10 @@ ServicePage fleet_page(const Watched& server) {
   const auto running = server.trainer.unfinished_jobs().size();
   const std::string body =
       html_section("Now",
-                   fmt::format("<p class=\"verdict\">{}</p>{}<p>{}: {} wait or run.</p><p class=\"note\">{} {}, read "
+                   fmt::format("<p class=\"verdict\">{}</p>{}<p>{}: {} wait or run. {}: who serves and trains.</p><p class=\"note\">{} {}, read "
                                "again every {} s.</p>",
-                               verdict, still, html_link("/jobs", "Jobs"), running, html_text(server.server_id),
+                               verdict, still, html_link("/jobs", "Jobs"), running, html_link("/fleet", "Servers"),
+                               html_text(server.server_id),
                                html_text(server.program_version), kLiveAgain)) +
       troubles_of(server) +
       html_section("Cells",
@@ -290,6 +292,7 @@ Result<ServicePage> job_page(const Watched& server, std::int64_t id) {
                                {{"asked (UTC)", html_time(job->created_at)}},
                                {{"begun (UTC)", html_time(job->started_at)}},
                                {{"ended (UTC)", html_time(job->finished_at)}},
+                               {{"server", job->server.empty() ? "–" : html_text(job->server)}},
                                {{"outcome", outcome_of(*job, now)}}};
   const JobOutcome& outcome = job->outcome;
   if (outcome.before || outcome.after)

@@ -99,14 +99,37 @@ void add_jobs(MetricFamilies& out, const std::vector<JobProgress>& unfinished,
 }
 
 void add_store(MetricFamilies& out, const Watched& server) {
-  const StoreFileFigures file = store_file_figures(server.store_path);
   const StoreState state = server.store.state();
-  out.gauge("trammel_store_bytes", "Size of the store.", file.bytes);
-  out.gauge("trammel_store_journal_bytes", "Size of its write-ahead log.", file.journal_bytes);
-  out.gauge("trammel_store_free_bytes", "Room on its disk.", file.free_bytes);
+  if (!server.store.is_shared()) {  // a database has its host, and figures of its own
+    const StoreFileFigures file = store_file_figures(server.store_path);
+    out.gauge("trammel_store_bytes", "Size of the store.", file.bytes);
+    out.gauge("trammel_store_journal_bytes", "Size of its write-ahead log.", file.journal_bytes);
+    out.gauge("trammel_store_free_bytes", "Room on its disk.", file.free_bytes);
+  }
   out.gauge("trammel_store_writable", "1: changes can be stored.", state.why_not_written ? 0 : 1);
   out.counter("trammel_store_failed_writes_total", "Changes that the disk did not take.", number(state.failed_writes));
   out.gauge("trammel_troubles", "What is wrong now, as the status says it.", number(server.trainer.troubles().size()));
+}
+
+/// As the servers were heard of last. While the record is away nobody knows who is there.
+void add_record(MetricFamilies& out, const Watched& server) {
+  const StoreState state = server.store.state();
+  const bool reachable = !state.why_not_written;
+  out.gauge("trammel_record_reachable", "1: the store can be read and written.", reachable ? 1 : 0);
+  out.gauge("trammel_record_away_seconds", "For how long it has not been; 0: it is reachable.",
+            reachable ? 0 : static_cast<double>(unix_now() - state.since));
+  if (!reachable) return;
+  const std::vector<ServerInRecord> servers = server.trainer.servers_seen();
+  const auto each = [&](const char* name, const char* help, const auto& value) {
+    for (const ServerInRecord& one : servers)
+      out.gauge(name, help, value(one), {{"name", one.self.server}, {"host", one.self.host}});
+  };
+  each("trammel_server_there", "1: the server of the record is there; 0: it went without a word.",
+       [](const ServerInRecord& one) { return one.is_gone ? 0.0 : 1.0; });
+  each("trammel_server_changes_behind", "Changes of the record that the server has not taken up.",
+       [](const ServerInRecord& one) { return static_cast<double>(one.behind); });
+  each("trammel_server_jobs", "Jobs that the server works on.",
+       [](const ServerInRecord& one) { return static_cast<double>(one.works_on.size()); });
 }
 
 void add_models_in_memory(MetricFamilies& out, const ModelRegistry& registry) {
@@ -163,6 +186,7 @@ std::string Metrics::text(ServerPhase phase, std::uint64_t shed) {
   }
   add_jobs(out, server_.trainer.unfinished_jobs(), ended);
   add_store(out, server_);
+  add_record(out, server_);
   add_models_in_memory(out, server_.registry);
   for (const CellReadiness& one : cells_readiness(server_)) {
     out.gauge("trammel_cell_ready", "1: the cell is answered for.", one.is_dark() ? 0 : 1,

@@ -35,7 +35,7 @@ constexpr std::string_view kWayBackStyle = R"(
 )";
 
 std::string way_back(const std::string& cell) {
-  std::string links = html_link("/", "Cells") + html_link("/jobs", "Jobs");
+  std::string links = html_link("/", "Cells") + html_link("/jobs", "Jobs") + html_link("/fleet", "Servers");
   if (!cell.empty())
     links += html_link(cell_address(cell), cell) + html_link(cell_address(cell) + "/history", "History");
   return "<nav class=\"service\">" + links + "</nav>";

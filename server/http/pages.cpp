@@ -5,6 +5,7 @@
 
 #include "server/http/live_pages.h"
 #include "server/http/page_shell.h"
+#include "server/http/servers_page.h"
 #include "server/report/health_page.h"
 #include "server/report/html.h"
 
@@ -66,6 +67,8 @@ HttpReply Pages::answer(const HttpAsk& ask, ServerPhase phase) {
   if (path.empty()) return kept("/", kForAMoment, [this] { return page_reply(fleet_page(server_)); });
   if (path[0] == "cells" && path.size() >= 2) return of_cell(ask);
   if (path[0] == "jobs") return of_job(ask);
+  if (path[0] == "fleet" && path.size() == 1)
+    return kept("/fleet", kForAMoment, [this] { return page_reply(servers_page(server_)); });
   return not_there();
 }
 

@@ -35,6 +35,8 @@ State state_of(const CellTrouble& trouble) {
       return State::kUnreadable;
     case CellTrouble::Kind::kOlderServed:
       return State::kOlderServed;
+    case CellTrouble::Kind::kSetApart:
+      return State::kDescribedOtherwise;
     case CellTrouble::Kind::kCopyServed:
       return State::kCopyServed;
   }
@@ -88,7 +90,29 @@ std::vector<std::string> notes_of(const Watched& server) {
                                 sentence(*state.why_not_written)));
   if (!state.clock.empty()) notes.push_back(state.clock);
   notes.insert(notes.end(), state.damages.begin(), state.damages.end());
+  for (const ServerInRecord& one : server.trainer.servers_seen()) {
+    if (one.is_gone)
+      notes.push_back(fmt::format("server {} on {} is gone: not heard of for {} s", one.self.server, one.self.host,
+                                  one.silent_s));
+  }
   return notes;
+}
+
+/// The record and its servers, without asking it.
+nlohmann::ordered_json record_seen(const Watched& server) {
+  const StoreState state = server.store.state();
+  nlohmann::ordered_json servers = nlohmann::ordered_json::array();
+  for (const ServerInRecord& one : server.trainer.servers_seen())
+    servers.push_back({{"server", one.self.server},
+                       {"host", one.self.host},
+                       {"gone", one.is_gone},
+                       {"serves", one.self.serves},
+                       {"trains", one.self.trains},
+                       {"changes_behind", one.behind}});
+  nlohmann::ordered_json record = {
+      {"reachable", !state.why_not_written}, {"away_since_unix_s", nullptr}, {"servers", std::move(servers)}};
+  if (state.why_not_written) record["away_since_unix_s"] = state.since;
+  return record;
 }
 
 nlohmann::ordered_json json_of(const CellReadiness& one) {
@@ -140,6 +164,8 @@ const char* to_text(CellReadiness::State state) {
       return "of_another_robot";
     case State::kUnreadable:
       return "unreadable";
+    case State::kDescribedOtherwise:
+      return "described_otherwise";
   }
   return "";
 }
@@ -163,6 +189,7 @@ Readiness readiness(const Watched& server, ServerPhase phase, const std::string&
   if (cells.empty()) return not_ready("unknown", fmt::format("cell {} is not served here", cell));
   Readiness told = of_cells(cells);
   told.told["notes"] = notes_of(server);
+  told.told["record"] = record_seen(server);
   return told;
 }
 

@@ -20,7 +20,8 @@ struct CellReadiness {
     kInTraining,     ///< dark: the first model is being made
     kTrainingEnded,  ///< dark: a training has ended without a model in force
     kOfAnotherRobot,
-    kUnreadable
+    kUnreadable,
+    kDescribedOtherwise  ///< dark here: another server of the record has other files of the cell
   };
   std::string cell;
   State state = State::kServed;

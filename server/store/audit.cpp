@@ -16,6 +16,7 @@ std::string hash_of(const AuditRow& row) {
   for (const std::string& part : {std::to_string(row.number), std::to_string(row.at), row.who, row.cell, row.what,
                                   row.subject, row.before, row.after, row.why, row.request, row.hash_before})
     content += fmt::format("{}:{},", part.size(), part);
+  if (!row.server.empty()) content += fmt::format("{}:{},", row.server.size(), row.server);
   return sha256_hex(content);
 }
 

@@ -22,7 +22,8 @@ struct AuditRow {
   std::string why;          ///< what was said of it; may be empty
   std::string request;      ///< the id under which it happened once; empty: none
   std::string hash_before;  ///< of the row before; empty: of the first row
-  std::string hash;         ///< SHA-256 of all of the above, each as `bytes:text,`
+  std::string hash;         ///< SHA-256 of all of the above, each as `bytes:text,`, and of `server` where there is one
+  std::string server = {};  ///< that made the change; empty: the one that has the store alone, or a command
 };
 
 /// What `hash` of the row must be.

@@ -13,6 +13,7 @@ ordered_json row_json(const AuditRow& row) {
   return {{"number", row.number},
           {"at_unix_s", row.at},
           {"who", row.who},
+          {"server", row.server},
           {"cell", row.cell},
           {"what", row.what},
           {"subject", row.subject},
@@ -28,7 +29,8 @@ AuditRow row_of(const nlohmann::json& json) {
   const auto text = [&json](const char* key) { return json.at(key).get<std::string>(); };
   AuditRow row{json.at("number"), json.at("at_unix_s"), text("who"),         text("cell"),
                text("what"),      text("subject"),      text("before"),      text("after"),
-               text("why"),       text("request"),      text("hash_before"), text("hash")};
+               text("why"),       text("request"),      text("hash_before"), text("hash"),
+               json.value("server", "")};
   return row;
 }
 

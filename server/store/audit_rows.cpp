@@ -28,7 +28,7 @@ End end_of(Database& database, const std::string& sql = kEnd) {
 AuditRow row_of(Rows& row) {
   const auto text = [&row](int column) { return row.text(column); };
   return {row.integer64(0), row.integer64(1), text(2), text(3), text(4),  text(5),
-          text(6),          text(7),          text(8), text(9), text(10), text(11)};
+          text(6),          text(7),          text(8), text(9), text(10), text(11), text(12)};
 }
 
 }  // namespace
@@ -39,16 +39,16 @@ void append(Database& database, const AuditEntry& entry, const ChangeId& by) {
   const End end = end_of(database, locked(database, kEnd));
   AuditRow row{
       end.rows + 1, unix_now(),  by.who.empty() ? "service" : by.who,       entry.cell, entry.what, entry.subject,
-      entry.before, entry.after, entry.why.empty() ? by.reason : entry.why, by.id,      end.hash,   {}};
+      entry.before, entry.after, entry.why.empty() ? by.reason : entry.why, by.id,      end.hash,   {}, database.writer()};
   row.hash = hash_of(row);
   // The row before is looked at in the same statement: of a store that was moved services know only when they connect.
-  const int added =
-      change(database,
-             "INSERT INTO audit (number, at, who, cell, what, subject, before, after, why, request, hash_before, hash) "
-             "SELECT CAST($1 AS BIGINT), CAST($2 AS BIGINT), $3, $4, $5, $6, $7, $8, $9, $10, $11, $12 "
-             "WHERE $5 = 'reopen' OR NOT EXISTS (SELECT 1 FROM audit WHERE number = $1 - 1 AND what = 'moved')",
-             row.number, row.at, row.who, row.cell, row.what, row.subject, row.before, row.after, row.why, row.request,
-             row.hash_before, row.hash);
+  const int added = change(
+      database,
+      "INSERT INTO audit (number, at, who, cell, what, subject, before, after, why, request, hash_before, hash, server) "
+      "SELECT CAST($1 AS BIGINT), CAST($2 AS BIGINT), $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13 "
+      "WHERE $5 = 'reopen' OR NOT EXISTS (SELECT 1 FROM audit WHERE number = $1 - 1 AND what = 'moved')",
+      row.number, row.at, row.who, row.cell, row.what, row.subject, row.before, row.after, row.why, row.request,
+      row.hash_before, row.hash, row.server);
   if (added == 0) throw DatabaseError(DatabaseError::Kind::kAway, "was moved elsewhere: its audit trail says where to");
   change(database, "UPDATE audit_end SET rows = $1, hash = $2", row.number, row.hash);
   // However often a transaction says it, others hear it once.
@@ -62,9 +62,20 @@ void record_audit(Database& database, const AuditEntry& entry, const ChangeId& b
   database.at_end([entry, by](Database& open) { append(open, entry, by); });
 }
 
+bool trail_names_servers(Database& database) {
+  return database.is_shared() ||
+         integer_of(database, "SELECT COUNT(*) FROM pragma_table_info('audit') WHERE name = 'server'") > 0;
+}
+
+void name_servers_in_trail(Database& database) {
+  if (!trail_names_servers(database)) database.execute(in_sqlite(kAuditServer));
+}
+
 void prepare_audit(Database& database, bool is_new, std::int64_t schema_before) {
-  if (database.has_table("audit")) return;
-  database.execute(in_sqlite(kAuditTables));
+  const bool had_trail = database.has_table("audit");
+  if (!had_trail) database.execute(in_sqlite(kAuditTables));
+  name_servers_in_trail(database);
+  if (had_trail) return;
   if (is_new) {
     record_audit(database, {"", "store", "store", "", fmt::format("schema {}", kSchemaVersion)});
     return;
@@ -89,10 +100,11 @@ std::int64_t last_audit_at(Database& database) {
 std::int64_t audit_rows(Database& database) { return end_of(database).rows; }
 
 bool read_more(Database& database, const AuditQuery& query, AuditChain& chain, AuditTrail& trail) {
-  auto rows = prepare(database,
-                      "SELECT number, at, who, cell, what, subject, before, after, why, request, hash_before, hash "
-                      "FROM audit WHERE number > $1 ORDER BY number LIMIT $2",
-                      chain.rows(), kRowsAtOnce);
+  const std::string wanted = fmt::format(
+      "SELECT number, at, who, cell, what, subject, before, after, why, request, hash_before, hash, {} "
+      "FROM audit WHERE number > $1 ORDER BY number LIMIT $2",
+      trail_names_servers(database) ? "server" : "''");
+  auto rows = prepare(database, wanted.c_str(), chain.rows(), kRowsAtOnce);
   bool any = false;
   while (!trail.broken && rows.next()) {
     any = true;

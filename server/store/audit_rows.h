@@ -24,6 +24,11 @@ void record_audit(Database& database, const AuditEntry& entry, const ChangeId& b
 /// Makes the trail where there is none, and records how it began.
 void prepare_audit(Database& database, bool is_new, std::int64_t schema_before);
 
+/// Whether the rows say which server made the change: a file of before does not.
+[[nodiscard]] bool trail_names_servers(Database& database);
+/// From now on they do.
+void name_servers_in_trail(Database& database);
+
 /// When the last row was written, as the clock stood then (Unix time, s); 0: there is none that can be read.
 [[nodiscard]] std::int64_t last_audit_at(Database& database);
 

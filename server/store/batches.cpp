@@ -98,8 +98,13 @@ Result<StoredJob> Store::add_batch(const StoredBatch& batch, const StoredJob& jo
 }
 
 Status Store::set_quarantine(const std::string& cell, const std::string& id, const std::string& reason,
-                             const ChangeId& change_id) {
-  const auto changed = connection_->in_transaction([&](Database& database) {
+                             const ChangeId& change_id, std::int64_t by_job) {
+  const auto changed = connection_->in_transaction([&](Database& database) -> Result<ChangeOutcome> {
+    if (by_job != 0) {
+      lock_cell(database, cell);
+      if (const Status held = check_held(database, connection_->worker, by_job, true); !held)
+        return tl::make_unexpected(held.error());
+    }
     return once(database, cell, change_id, [&]() -> Result<ChangeOutcome> {
       const auto batch = read_record(database, cell, id);
       if (!batch) return tl::make_unexpected(batch.error());

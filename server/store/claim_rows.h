@@ -5,19 +5,23 @@
 #include <string>
 
 #include "server/store/database/database.h"
+#include "server/store/servers.h"
 
 /// Who works on a job, for the transactions of jobs and models.
 namespace trammel {
 
 /// For so long a server is believed to live that has not been heard of: what it works on is taken up by another one
 /// within 20 s of its end.
-constexpr std::chrono::seconds kLease{15};
+constexpr std::chrono::seconds kLease = kGoneAfter;
 
 /// Whoever works on jobs through one connection.
 struct Worker {
   std::string server;  ///< as people know it
   std::string token;   ///< of this start of it: what a start before claimed is not its own
 };
+
+/// Times of claims and servers are the database's: servers have clocks of their own. Unix time, s.
+[[nodiscard]] std::int64_t now_of(Database& database);
 
 /// Has a token of its own, and no name.
 [[nodiscard]] Worker new_worker();

@@ -1,6 +1,7 @@
 #include <optional>
 #include <random>
 
+#include "server/store/audit_rows.h"
 #include "server/store/cell_rows.h"
 #include "server/store/changes.h"
 #include "server/store/claim_rows.h"
@@ -13,12 +14,6 @@
 
 namespace trammel {
 namespace {
-
-/// Times of claims are the database's: servers have clocks of their own.
-std::int64_t now_of(Database& database) {
-  return integer_of(database, database.is_shared() ? "SELECT CAST(EXTRACT(EPOCH FROM clock_timestamp()) AS bigint)"
-                                                   : "SELECT unixepoch()");
-}
 
 struct Claim {
   std::string server, token;
@@ -52,6 +47,11 @@ Status check_free(Database& database, const Worker& worker, const std::string& c
 }
 
 }  // namespace
+
+std::int64_t now_of(Database& database) {
+  return integer_of(database, database.is_shared() ? "SELECT CAST(EXTRACT(EPOCH FROM clock_timestamp()) AS bigint)"
+                                                   : "SELECT unixepoch()");
+}
 
 Worker new_worker() {
   std::random_device random;
@@ -96,7 +96,7 @@ void Store::wait_for_change(const std::stop_token& stop, std::chrono::millisecon
 }
 
 Result<ClaimState> Store::renew_claim(std::int64_t job) {
-  return connection_->in_transaction([&](Database& database) -> Result<ClaimState> {
+  return connection_->urgently([&](Database& database) -> Result<ClaimState> {
     auto row =
         prepare(database, "UPDATE job_claims SET lease_until = $1 WHERE job = $2 AND token = $3 RETURNING cancelled_by",
                 now_of(database) + kLease.count(), job, connection_->worker.token);
@@ -107,19 +107,27 @@ Result<ClaimState> Store::renew_claim(std::int64_t job) {
   });
 }
 
-Status Store::ask_to_cancel(std::int64_t job, const ChangeId& by) {
-  const auto ask = [&](Database& database) -> Result<ChangeOutcome> {
-    const int asked = change(database,
-                             "UPDATE job_claims SET cancelled_by = $1 WHERE job = $2 AND job IN "
-                             "(SELECT id FROM jobs WHERE state = 'running')",
-                             by.who, job);
-    if (asked == 1) return ChangeOutcome{0, job};
-    return failure(ErrorCode::kConflict, "job {} is not worked on", job).of("job").with_value(job);
+Result<CancelledJob> Store::cancel_job(std::int64_t job, const JobOutcome& outcome, const ChangeId& by) {
+  const auto cancel = [&](Database& database) -> Result<ChangeOutcome> {
+    lock_job(database, job);
+    const bool waits = exists(database, "SELECT 1 FROM jobs WHERE id = $1 AND state = 'queued'", job);
+    const bool runs = exists(database, "SELECT 1 FROM jobs WHERE id = $1 AND state = 'running'", job);
+    if (!waits && !runs) return failure(ErrorCode::kConflict, "job {} is over", job).of("job").with_value(job);
+    const int heard = waits ? 0
+                            : change(database, "UPDATE job_claims SET cancelled_by = $1 WHERE job = $2 AND lease_until > $3",
+                                     by.who, job, now_of(database));
+    // Nobody works on it, or nobody who lives.
+    if (heard == 0) static_cast<void>(fail_job(database, job, outcome.why, outcome, by));
+    if (database.is_shared()) static_cast<void>(exists(database, "SELECT pg_notify($1, '')", kChangesChannel));
+    return ChangeOutcome{0, job};
   };
-  const auto asked = connection_->in_transaction([&](Database& database) {
-    return once(database, cell_of_job(database, job), by, [&] { return ask(database); });
+  return connection_->in_transaction([&](Database& database) -> Result<CancelledJob> {
+    const auto cancelled =
+        once(database, cell_of_job(database, job), by, [&]() -> Result<ChangeOutcome> { return cancel(database); });
+    if (!cancelled) return tl::make_unexpected(cancelled.error());
+    const bool runs = exists(database, "SELECT 1 FROM jobs WHERE id = $1 AND state = 'running'", job);
+    return runs ? CancelledJob::kAsked : CancelledJob::kEnded;
   });
-  return asked.map([](const ChangeOutcome&) {});
 }
 
 Result<std::set<std::int64_t>> Store::jobs_to_take() const {

@@ -41,6 +41,12 @@ class StoreConnection {
     return through([this](const Job& job) { return write(job); }, work);
   }
 
+  /// The same for what must not wait for others of this server that wait: a heartbeat.
+  template <typename Work>
+  std::invoke_result_t<const Work&, Database&> urgently(const Work& work) {
+    return through([this](const Job& job) { return write_urgently(job); }, work);
+  }
+
   /// Several servers write it: what it says goes, whatever the copies remember.
   [[nodiscard]] virtual bool is_shared() const = 0;
   /// Where it could not be written, or is not as it was left: whether it can be written now.
@@ -61,6 +67,7 @@ class StoreConnection {
   const std::string path;  ///< a file, or a URL as it is told to people
   const std::unique_ptr<ServedCopies> copies;
   Worker worker = new_worker();  ///< its name is set before there are jobs
+  std::string told_cells;        ///< what the last heartbeat said of them; of the one thread that has it
   mutable Mutex state_mutex;     // taken last, and for moments only
   Condition state_changed;
   StoreState state_now TRAMMEL_GUARDED_BY(state_mutex);
@@ -74,6 +81,7 @@ class StoreConnection {
  private:
   [[nodiscard]] virtual Status read(const Job& job) = 0;
   [[nodiscard]] virtual Status write(const Job& job) = 0;
+  [[nodiscard]] virtual Status write_urgently(const Job& job) { return write(job); }
 
   template <typename Way, typename Work>
   static std::invoke_result_t<const Work&, Database&> through(const Way& way, const Work& work) {

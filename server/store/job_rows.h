@@ -21,6 +21,9 @@ void insert_job_batches(Database& database, std::int64_t job, const std::string&
 [[nodiscard]] std::string cell_of_job(Database& database, std::int64_t job);
 /// kNotFound: there is none.
 [[nodiscard]] Result<StoredJob> read_job(Database& database, std::int64_t id);
+/// Marks an unfinished job failed, with the row of the audit trail; false: there is none.
+bool fail_job(Database& database, std::int64_t id, const std::string& message, const JobOutcome& outcome,
+              const ChangeId& by);
 /// Marks an unfinished job of `cell` (empty: any) done; kNotFound: there is none.
 [[nodiscard]] Status end_job(Database& database, const Worker& worker, std::int64_t id, const std::string& cell,
                              int model_version, const std::string& message, const JobOutcome& outcome);

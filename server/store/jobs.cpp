@@ -98,7 +98,7 @@ StoredJob job_of(Database& database, Rows& row) {
   job.started_at = optional_integer(row, 10);
   job.finished_at = optional_integer(row, 11);
   job.outcome = outcome_of(row);
-  if (job.state == JobState::kRunning) job.server = row.text(21);
+  if (job.state != JobState::kQueued) job.server = row.text(21);
   job.batch_ids = batches_of(database, job.id);
   return job;
 }
@@ -243,6 +243,16 @@ Result<StoredJob> queue_once(Database& database, const StoredJob& job, const Cha
 
 }  // namespace
 
+bool fail_job(Database& database, std::int64_t id, const std::string& message, const JobOutcome& outcome,
+              const ChangeId& by) {
+  if (change(database, "UPDATE jobs SET state = 'failed', message = $1 WHERE id = $2 AND state IN ('queued', 'running')",
+             message, id) != 1)
+    return false;
+  record_end(database, id, outcome);
+  record_job_end(database, id, to_text(outcome.verdict), message, by);
+  return true;
+}
+
 Result<StoredJob> Store::add_job(const StoredJob& job, bool release, const ChangeId& change_id) {
   return connection_->in_transaction([&](Database& database) {
     return queue_once(database, job, change_id, [&]() -> Result<StoredJob> {
@@ -384,16 +394,9 @@ Status Store::set_job_failed(std::int64_t id, const std::string& message, const 
   const auto fail = [&](Database& database) -> Result<ChangeOutcome> {
     if (const Status held = check_held(database, connection_->worker, id); !held)
       return tl::make_unexpected(held.error());
-    return changed_one(change(database,
-                              "UPDATE jobs SET state = 'failed', message = $1 "
-                              "WHERE id = $2 AND state IN ('queued', 'running')",
-                              message, id),
-                       id)
-        .map([&] {
-          record_end(database, id, outcome);
-          record_job_end(database, id, to_text(outcome.verdict), message, by);
-          return ChangeOutcome{0, id};
-        });
+    return changed_one(fail_job(database, id, message, outcome, by) ? 1 : 0, id).map([&] {
+      return ChangeOutcome{0, id};
+    });
   };
   const auto failed = connection_->in_transaction([&](Database& database) {
     return once(database, cell_of_job(database, id), by, [&] { return fail(database); });

@@ -24,6 +24,7 @@ Status take_up_again(Database& database, const std::string& place) {
   const Status in_use = check_not_moved(database, place);
   if (in_use) return refused("was not moved").in(place).next("start its services");
   if (in_use.error().field != kMovedField) return in_use;
+  name_servers_in_trail(database);
   record_audit(database, {"", kReopenedRow, "store", "", place});
   transaction.commit();
   return {};
@@ -52,6 +53,7 @@ Status check_not_moved(Database& database, const std::string& place) {
 }
 
 void record_move(Database& database, const std::string& to) {
+  name_servers_in_trail(database);
   record_audit(database, {"", kMovedRow, "store", "", to});
 }
 

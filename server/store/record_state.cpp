@@ -1,5 +1,6 @@
 #include "server/store/commit_safety.h"
 #include "server/store/connection.h"
+#include "server/store/statements.h"
 #include "server/store/store.h"
 
 namespace trammel {
@@ -17,10 +18,14 @@ RecordState Store::record() const {
   if (!is_shared()) {
     record.survives = "a crash of this host, and not its loss: this host only";
   } else if (record.reachable) {
-    const auto safety = connection_->exclusively(
-        [](Database& database) -> Result<CommitSafety> { return safety_of(commit_settings(database)); });
-    record.survives = safety ? safety->survives : "";
-    record.worry = safety ? safety->worry : "";
+    static_cast<void>(connection_->exclusively([&record](Database& database) -> Status {
+      const CommitSafety safety = safety_of(commit_settings(database));
+      record.survives = safety.survives;
+      record.worry = safety.worry;
+      record.trail_is_safe =
+          !exists(database, "SELECT 1 WHERE has_table_privilege(current_user, 'audit', 'UPDATE, DELETE, TRUNCATE')");
+      return {};
+    }));
   }
   return record;
 }

@@ -194,6 +194,33 @@ CREATE TABLE audit_end (rows INTEGER NOT NULL, hash TEXT NOT NULL);
 INSERT INTO audit_end (rows, hash) VALUES (0, '');
 )sql";
 
+const char* const kAuditServer = "ALTER TABLE audit ADD COLUMN server TEXT NOT NULL DEFAULT '';";
+
+const char* const kTablesOfServers = R"sql(
+CREATE TABLE servers (
+  token      TEXT    PRIMARY KEY,
+  server     TEXT    NOT NULL,
+  host       TEXT    NOT NULL,
+  pid        INTEGER NOT NULL,
+  program    TEXT    NOT NULL,
+  since      INTEGER NOT NULL,
+  heard_at   INTEGER NOT NULL,
+  serves     INTEGER NOT NULL,
+  trains     INTEGER NOT NULL,
+  followed   INTEGER NOT NULL,
+  cells_json BYTES   NOT NULL
+);
+CREATE TABLE cell_descriptions (
+  number       INTEGER PRIMARY KEY AUTOINCREMENT,
+  cell         TEXT    NOT NULL,
+  cell_hash    TEXT    NOT NULL,
+  robot_hash   TEXT    NOT NULL,
+  server       TEXT    NOT NULL,
+  described_at INTEGER NOT NULL
+);
+CREATE INDEX cell_descriptions_by_cell ON cell_descriptions (cell, number);
+)sql";
+
 std::string in_sqlite(std::string tables) { return with(std::move(tables), {{"BYTES", "TEXT "}}); }
 
 std::string in_postgres(std::string tables) {

@@ -14,6 +14,7 @@ namespace trammel {
 namespace {
 
 constexpr std::size_t kMostConnections = 4;
+constexpr std::size_t kMostWithHeartbeat = kMostConnections + 1;
 constexpr std::chrono::seconds kPatience{6};  // for a connection that others use, and for rows that others lock
 constexpr int kMostTries = 5;
 
@@ -75,11 +76,11 @@ Result<SharedConnection::Connected> SharedConnection::connect() {
   return connected;
 }
 
-Result<SharedConnection::Connected> SharedConnection::borrow() {
+Result<SharedConnection::Connected> SharedConnection::borrow(std::size_t most) {
   {
     MutexLock guard(mutex_);
     const bool free = given_back_.wait_until(guard, Clock::now() + kPatience,
-                                             [this]() TRAMMEL_REQUIRES(mutex_) { return lent_ < kMostConnections; });
+                                             [this, most]() TRAMMEL_REQUIRES(mutex_) { return lent_ < most; });
     if (!free) return failure(ErrorCode::kBusy, "all {} connections are in use", lent_).in(path).next("ask again");
     ++lent_;
     if (!idle_.empty()) {
@@ -103,23 +104,28 @@ void SharedConnection::give_back(Connected connected) {
     }
     if (connected && !connected->is_lost()) idle_.push_back(std::move(connected));
   }
-  given_back_.notify_one();
+  given_back_.notify_all();  // not all who wait need as few to be in use
 }
 
 Status SharedConnection::read(const Job& job) {
   if (const StoreState now = state(); !now.readable) return tl::make_unexpected(*now.why_not_written);
-  return run(job, Transaction::For::kReading);
+  return run(job, Transaction::For::kReading, kMostConnections);
 }
 
 Status SharedConnection::write(const Job& job) {
   if (const auto why = state().why_not_written) return tl::make_unexpected(*why);
-  return run(job, Transaction::For::kWriting);
+  return run(job, Transaction::For::kWriting, kMostConnections);
 }
 
-Status SharedConnection::run(const Job& job, Transaction::For what) {
+Status SharedConnection::write_urgently(const Job& job) {
+  if (const auto why = state().why_not_written) return tl::make_unexpected(*why);
+  return run(job, Transaction::For::kWriting, kMostWithHeartbeat);
+}
+
+Status SharedConnection::run(const Job& job, Transaction::For what, std::size_t most) {
   const auto until = Clock::now() + kPatience;
   for (int tries = 1;; ++tries) {
-    auto connected = borrow();
+    auto connected = borrow(most);
     if (!connected) {
       const Error why = Failure(connected.error()).as(ErrorCode::kBusy).value();
       if (connected.error().code != ErrorCode::kBusy) note_trouble(why, true);
@@ -129,6 +135,7 @@ Status SharedConnection::run(const Job& job, Transaction::For what) {
     std::optional<DatabaseError> failed;
     try {
       Transaction transaction(**connected, what);
+      (*connected)->written_by(worker.server);
       result = job(**connected);
       if (result) transaction.commit();
     } catch (const DatabaseError& error) {
@@ -160,7 +167,7 @@ Status SharedConnection::told(const DatabaseError& error, bool lost) {
 }
 
 std::string SharedConnection::who_holds() {
-  auto connected = borrow();
+  auto connected = borrow(kMostConnections);
   if (!connected) return "";
   std::string who;
   try {
@@ -211,7 +218,7 @@ Status SharedConnection::try_again() {
         change(database, "UPDATE store_identity SET id = id");
         return check_not_moved(database, path);
       },
-      Transaction::For::kWriting);
+      Transaction::For::kWriting, kMostConnections);
 }
 
 }  // namespace trammel

@@ -29,15 +29,16 @@ class SharedConnection final : public StoreConnection {
   SharedConnection(std::string url, std::unique_ptr<ServedCopies> kept);
   [[nodiscard]] Status read(const Job& job) override;
   [[nodiscard]] Status write(const Job& job) override;
-  /// In one transaction, again where others were in the way.
-  [[nodiscard]] Status run(const Job& job, Transaction::For what);
+  [[nodiscard]] Status write_urgently(const Job& job) override;
+  /// In one transaction, again where others were in the way. `most`: connections that may be in use with this one.
+  [[nodiscard]] Status run(const Job& job, Transaction::For what, std::size_t most);
   [[nodiscard]] Status told(const DatabaseError& error, bool lost);
 
   /// Whether it is the store that served here before, of a schema that this program knows.
   [[nodiscard]] Status admit(Database& database);
   [[nodiscard]] Result<Connected> connect();
   /// One that nobody uses, or a new one.
-  [[nodiscard]] Result<Connected> borrow();
+  [[nodiscard]] Result<Connected> borrow(std::size_t most);
   void give_back(Connected connected);
   /// Whether the word of a change came. Connects where needed: what changed before that is not told.
   [[nodiscard]] bool hears_of_change(const std::stop_token& stop, Clock::time_point until);

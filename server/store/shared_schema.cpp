@@ -1,6 +1,7 @@
 #include "server/store/shared_schema.h"
 
 #include <array>
+#include <vector>
 
 #include "server/store/audit_rows.h"
 #include "server/store/schema.h"
@@ -17,8 +18,8 @@ struct Migration {
   int works_from;  ///< the oldest schema whose programs work on this one, too
 };
 
-const std::array<Migration, 2>& migrations() {
-  static const std::array<Migration, 2> all = {
+const std::array<Migration, 3>& migrations() {
+  static const std::array<Migration, 3> all = {
       {{in_postgres(std::string(kSchema) + kSchemaAdded + kTablesBeside + kAuditTables) +
             "CREATE TABLE trammel_schema (version BIGINT NOT NULL, works_from BIGINT NOT NULL);"
             "INSERT INTO trammel_schema (version, works_from) VALUES (0, 0);"
@@ -26,7 +27,8 @@ const std::array<Migration, 2>& migrations() {
         1},
        {std::string(kTablesGone) + "CREATE INDEX IF NOT EXISTS jobs_by_cell ON jobs (cell, id);"
                                    "CREATE INDEX IF NOT EXISTS jobs_failed ON jobs (id) WHERE state = 'failed';",
-        2}}};
+        2},
+       {in_postgres(std::string(kAuditServer) + kTablesOfServers), 3}}};
   return all;
 }
 
@@ -64,6 +66,31 @@ Result<Schema> schema_of(Database& database, const std::string& place) {
   return too_new(schema.version, place);
 }
 
+/// Roles that were let in to use the store before; the owner needs no grant.
+std::vector<std::string> roles_let_in(Database& database) {
+  Rows rows = prepare(database,
+                      "SELECT DISTINCT grantee FROM information_schema.role_table_grants "
+                      "WHERE table_schema = current_schema() AND table_name = 'audit' AND privilege_type = 'INSERT' "
+                      "AND grantee <> current_user");
+  std::vector<std::string> roles;
+  while (rows.next()) roles.push_back(rows.text(0));
+  return roles;
+}
+
+void grant(Database& database, const std::string& role) {
+  Rows quoted = prepare(database, "SELECT quote_ident($1), quote_ident(current_schema())", role);
+  if (!quoted.next()) return;
+  const std::string to = quoted.text(0), in = quoted.text(1);
+  database.execute(
+      fmt::format("GRANT USAGE ON SCHEMA {1} TO {0};"
+                  "GRANT SELECT, INSERT, UPDATE, DELETE ON ALL TABLES IN SCHEMA {1} TO {0};"
+                  "REVOKE UPDATE, DELETE, TRUNCATE ON audit FROM {0};"
+                  "REVOKE INSERT, DELETE, TRUNCATE ON audit_end FROM {0};"
+                  "REVOKE UPDATE, DELETE, TRUNCATE ON cell_descriptions FROM {0};"
+                  "REVOKE INSERT, UPDATE, DELETE, TRUNCATE ON trammel_schema FROM {0}",
+                  to, in));
+}
+
 }  // namespace
 
 Status check_shared_schema(Database& database, const std::string& place) {
@@ -97,6 +124,10 @@ Status migrate_shared_schema(Database& database, const std::string& place) {
     database.execute(step.statements);
     change(database, "UPDATE trammel_schema SET version = $1, works_from = $2", version + 1, step.works_from);
   }
+  // New tables are for those who had the others.
+  if (schema->version > 0 && schema->version < newest()) {
+    for (const std::string& role : roles_let_in(database)) grant(database, role);
+  }
   if (schema->version < newest())
     record_audit(database, {"", schema->version == 0 ? "store" : "migrate", "store",
                             schema->version == 0 ? "" : fmt::format("schema {}", schema->version),
@@ -109,9 +140,11 @@ namespace {
 
 /// So that a service can say what a change survives. Only some owners may give that; without it, the service says so.
 void let_see_standbys(Database& database, const std::string& role) {
+  Rows quoted = prepare(database, "SELECT quote_ident($1)", role);
+  if (!quoted.next()) return;
   try {
     Transaction transaction(database, Transaction::For::kWriting);
-    database.execute(fmt::format("GRANT pg_read_all_stats TO {}", role));
+    database.execute(fmt::format("GRANT pg_read_all_stats TO {}", quoted.text(0)));
     transaction.commit();
   } catch (const DatabaseError& error) {
     if (error.kind() != DatabaseError::Kind::kRefused) throw;
@@ -123,19 +156,10 @@ void let_see_standbys(Database& database, const std::string& role) {
 Status grant_shared_store(Database& database, const std::string& role) {
   if (text_of(database, "SELECT current_user") == role)
     return refused("role {} owns the store, and could change its audit trail", role).next("grant it to another role");
-  Rows quoted = prepare(database, "SELECT quote_ident($1), quote_ident(current_schema())", role);
-  if (!quoted.next()) return {};
-  const std::string to = quoted.text(0), in = quoted.text(1);
   Transaction transaction(database, Transaction::For::kWriting);
-  database.execute(
-      fmt::format("GRANT USAGE ON SCHEMA {1} TO {0};"
-                  "GRANT SELECT, INSERT, UPDATE, DELETE ON ALL TABLES IN SCHEMA {1} TO {0};"
-                  "REVOKE UPDATE, DELETE, TRUNCATE ON audit FROM {0};"
-                  "REVOKE INSERT, DELETE, TRUNCATE ON audit_end FROM {0};"
-                  "REVOKE INSERT, UPDATE, DELETE, TRUNCATE ON trammel_schema FROM {0}",
-                  to, in));
+  grant(database, role);
   transaction.commit();
-  let_see_standbys(database, to);
+  let_see_standbys(database, role);
   return {};
 }
 

@@ -16,6 +16,7 @@
 #include "server/store/change_id.h"
 #include "server/store/job_outcome.h"
 #include "server/store/served_models.h"
+#include "server/store/servers.h"
 #include "server/store/store_state.h"
 
 /// Everything that survives a restart: batches, jobs, models and their history, in one SQLite file (WAL,
@@ -59,13 +60,19 @@ struct StoredJob {
   std::optional<std::int64_t> started_at = {};   ///< Unix time, s, of its last start; empty: not yet, or not recorded
   std::optional<std::int64_t> finished_at = {};  ///< likewise, of its end
   JobOutcome outcome = {};                       ///< the same as `message`, as data
-  std::string server = {};                       ///< that works on it; empty: none, or not recorded
+  std::string server = {};                       ///< that works on it, or did; empty: none, or not recorded
 };
 
 /// What became of the claim on a job that runs here.
 struct ClaimState {
   bool is_held = false;                          ///< false: the lease was over, and another server has taken the job
   std::optional<std::string> cancelled_by = {};  ///< who asked another server that it ends; empty: nobody
+};
+
+/// What came of a wish that a job ends.
+enum class CancelledJob {
+  kEnded,  ///< it waited, or its server is gone: it is over
+  kAsked   ///< the server that works on it hears of it
 };
 
 /// The request of a diagnosis and its findings.
@@ -189,8 +196,9 @@ class Store {
   /// The ids of the batches that any model of the cell was trained from.
   [[nodiscard]] Result<std::set<std::string>> batches_learned_from(const std::string& cell) const;
   /// Puts the batch in quarantine for `reason`, or releases it (empty). Refuses (kConflict) one that was discarded.
+  /// `by_job`: refuses (kNotFound), too, where another server has that job by now.
   [[nodiscard]] Status set_quarantine(const std::string& cell, const std::string& id, const std::string& reason,
-                                      const ChangeId& change_id = {});
+                                      const ChangeId& change_id = {}, std::int64_t by_job = 0);
   /// Nothing takes the batch any more: it is in quarantine for ever. Its text stays until it is pruned.
   [[nodiscard]] Status discard(const std::string& cell, const std::string& id, const ChangeId& change_id = {});
   /// Newest last, without their text.
@@ -206,8 +214,24 @@ class Store {
   void works_as(const std::string& server);
   /// Tells that this server still works on the job that it claimed.
   [[nodiscard]] Result<ClaimState> renew_claim(std::int64_t job);
-  /// Has the server that works on the job end it. Refuses (kConflict) where none does.
-  [[nodiscard]] Status ask_to_cancel(std::int64_t job, const ChangeId& by);
+  /// Ends a job that waits, and has the server that works on it end one that runs. Refuses (kConflict) one that is over.
+  [[nodiscard]] Result<CancelledJob> cancel_job(std::int64_t job, const JobOutcome& outcome, const ChangeId& by);
+  /// A heartbeat: says to the others that this server is there, and what it does. Of a store that several servers
+  /// share; else nothing is told. For one thread at a time.
+  [[nodiscard]] Status tell_presence(const ServerSelf& self);
+  /// It ends: the others need not wait for its heartbeat.
+  [[nodiscard]] Status take_leave();
+  /// All that are there, and those that went without a word during the last day, by name; `with_cells`: with what they
+  /// serve. Of a store that one server has: none.
+  [[nodiscard]] Result<std::vector<ServerInRecord>> servers(bool with_cells) const;
+  /// How many descriptions of cells there ever were: another number, another state of them.
+  [[nodiscard]] Result<std::int64_t> descriptions_made() const;
+  /// Compares how this server's files describe cells with the descriptions that the record goes by. A cell that has none
+  /// gets this one. Another one is taken where all servers that are there have it, two at least; or where no other one
+  /// is there and the one that is had was this server's own, as it `starts`. Returns the cells that it may not answer
+  /// for, and why, one sentence each. Needs tell_presence() before.
+  [[nodiscard]] Result<std::map<std::string, std::string>> agree_on_cells(
+      const std::map<std::string, CellDescription>& mine, bool starts);
   /// The jobs that wait and that no server works on that is believed to live, nor on another one of their cell.
   [[nodiscard]] Result<std::set<std::int64_t>> jobs_to_take() const;
   /// What was changed by changes that came after so many; see changes_made().

@@ -17,6 +17,7 @@ struct RecordState {
   std::optional<std::int64_t> away_since = {};  ///< Unix time, s
   std::string survives;                         ///< what a change that was acknowledged survives; empty: not known now
   std::string worry;  ///< what of that is not as it should be, and what to do about it; empty: nothing
+  std::optional<bool> trail_is_safe = {};  ///< the servers' role can neither change nor delete it; empty: not known
 };
 
 /// What the disk lets a store do.

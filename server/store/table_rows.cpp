@@ -2,8 +2,10 @@
 
 #include <bit>
 #include <charconv>
+#include <string_view>
 
 #include "server/base/hash.h"
+#include "server/store/audit_rows.h"
 
 namespace trammel {
 namespace {
@@ -93,7 +95,8 @@ const std::vector<StoreTable> kTables = {
                  {"why", 'b'},
                  {"request", 'b'},
                  {"hash_before", 'b'},
-                 {"hash", 'b'}})}};
+                 {"hash", 'b'},
+                 {"server", 'b'}})}};
 
 /// `a, b, c`, or `$1, $2, $3` where `placeholders`.
 std::string list_of(const StoreTable& table, std::size_t count, bool placeholders) {
@@ -141,7 +144,10 @@ const std::vector<StoreTable>& store_tables() { return kTables; }
 void each_row(Database& database, const StoreTable& table, const std::function<bool(const StoredRow&)>& visit) {
   const auto keys = static_cast<std::size_t>(table.keys);
   const std::string names = list_of(table, keys, false);
-  const std::string all = fmt::format("SELECT {} FROM {} ", list_of(table, table.columns.size(), false), table.name);
+  std::string columns = list_of(table, table.columns.size(), false);
+  if (table.name == std::string_view("audit") && !trail_names_servers(database))
+    columns.replace(columns.rfind("server"), std::string_view("server").size(), "''");
+  const std::string all = fmt::format("SELECT {} FROM {} ", columns, table.name);
   const std::string order = fmt::format("ORDER BY {} LIMIT {}", names, kRowsAtOnce);
   const std::string first = all + order;
   const std::string next = fmt::format("{}WHERE ({}) > ({}) {}", all, names, list_of(table, keys, true), order);

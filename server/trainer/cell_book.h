@@ -1,7 +1,10 @@
 #pragma once
 
 #include <atomic>
+#include <map>
 #include <memory>
+#include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -10,14 +13,37 @@
 
 namespace trammel {
 
-/// Which cells are served. Cells are added while requests and jobs are under way; none leaves. Thread-safe; whoever
-/// reads waits for nobody.
+/// Which cells are served. Cells are added while requests and jobs are under way; none leaves. Some may be set apart:
+/// this server knows them and may not answer for them now. Thread-safe; whoever reads waits for moments only.
 class CellBook {
  public:
   explicit CellBook(ServedCells cells) { keep(std::move(cells)); }
 
   /// Stays as it is as long as the book is there; the next call may give more cells.
   [[nodiscard]] const ServedCells& now() const { return *now_.load(); }
+
+  /// A cell that this server may answer for; else kNotFound, or kConflict with the reason.
+  [[nodiscard]] Result<std::shared_ptr<const Cell>> find(const std::string& name) const {
+    if (const auto why = why_apart(name)) return failure(ErrorCode::kConflict, "{}", *why).of("cell").with_text(name);
+    return find_cell(now(), name);
+  }
+
+  /// From now on these are set apart, for a reason each, and no others.
+  void set_apart(std::map<std::string, std::string> cells) {
+    const MutexLock lock(apart_mutex_);
+    any_apart_ = !cells.empty();
+    apart_ = std::move(cells);
+  }
+  [[nodiscard]] std::optional<std::string> why_apart(const std::string& cell) const {
+    if (!any_apart_) return std::nullopt;
+    const MutexLock lock(apart_mutex_);
+    const auto found = apart_.find(cell);
+    return found == apart_.end() ? std::nullopt : std::optional(found->second);
+  }
+  [[nodiscard]] std::map<std::string, std::string> apart() const {
+    const MutexLock lock(apart_mutex_);
+    return apart_;
+  }
 
   /// A cell that is there already stays as it was.
   void add(const ServedCells& more) {
@@ -36,6 +62,9 @@ class CellBook {
   Mutex mutex_;                                           // one at a time adds
   std::vector<std::unique_ptr<const ServedCells>> kept_;  // somebody may read one: pointers to cells, one map an add()
   std::atomic<const ServedCells*> now_ = nullptr;
+  mutable Mutex apart_mutex_;  // taken last
+  std::map<std::string, std::string> apart_ TRAMMEL_GUARDED_BY(apart_mutex_);
+  std::atomic<bool> any_apart_ = false;
 };
 
 }  // namespace trammel

@@ -110,8 +110,10 @@ JobRunner::Attempt JobRunner::attempt(std::int64_t id, const StopRequests& stop)
   const auto failed = [](const Error& error) { return tl::make_unexpected(Failed{error, verdict_of(error)}); };
   const auto job = store_.job(id);
   if (!job) return failed(job.error());
-  const auto cell = find_cell(cells_.now(), job->cell);
-  if (!cell) return failed(cell.error());
+  if (const auto cell = cells_.find(job->cell); !cell) {
+    const bool elsewhere = cell.error().code == ErrorCode::kConflict;  // others answer for it
+    return tl::make_unexpected(Failed{cell.error(), verdict_of(cell.error()), false, {}, elsewhere});
+  }
   const Status running = once_the_disk_lets(id, stop, [&] { return store_.set_job_running(id); });
   if (!running) {
     const bool elsewhere = running.error().code == ErrorCode::kConflict;
@@ -257,7 +259,7 @@ JobRunner::Attempt JobRunner::keep(const StoredJob& job, const Made& made, Compu
 JobRunner::Attempt JobRunner::quarantine(const StoredJob& job, const std::string& why, const ComputeCost& cost,
                                          const StopRequests& stop) {
   const std::string& id = job.batch_ids.front();
-  const Status kept = once_the_disk_lets(job.id, stop, [&] { return store_.set_quarantine(job.cell, id, why); });
+  const Status kept = once_the_disk_lets(job.id, stop, [&] { return store_.set_quarantine(job.cell, id, why, {}, job.id); });
   if (!kept) return tl::make_unexpected(Failed{kept.error(), verdict_of(kept.error())});
   Failure refusal = refused("batch {} is in quarantine: {}; nothing was learned from it", id, why)
                         .of("batch")

@@ -29,7 +29,6 @@ constexpr std::size_t kMaxSources = 500;            // as in a cell file
 constexpr int kJobsListed = 20;                     // of those done and of those failed, the last ones
 constexpr std::chrono::seconds kLoadingAtStart{1};  // of models, before the service says that it is ready
 constexpr std::chrono::seconds kKeeperTick{1};
-constexpr std::chrono::seconds kFollowTick{2};  // where no word came of a change
 constexpr int kKeeperNiceness = 5;              // answering comes before loading
 
 Status check_batch_id(const std::string& id) {
@@ -68,7 +67,8 @@ Trainer::Trainer(const ServedCells& cells, Store& store, ModelRegistry& registry
       queue_capacity_(options.queue_capacity),
       keep_(options.keep),
       history_(cells_, store, registry),
-      runner_(cells_, store, registry, history_, book_, options) {}
+      runner_(cells_, store, registry, history_, book_, options),
+      began_at_(unix_now()) {}
 
 Trainer::~Trainer() { stop(); }
 
@@ -82,6 +82,11 @@ void Trainer::set_listeners(ProgressListener progress, ModelListener model, Trou
 Result<std::vector<std::string>> Trainer::take_up() {
   TRAMMEL_CHECK(!worker_.joinable() && !taken_up_);
   std::vector<std::string> notices = history_.announce_all();
+  if (store_.is_shared()) {
+    presence_.describe(cells());
+    is_present_ = store_.tell_presence(self()).has_value();  // the others know of it before it compares
+    agree();
+  }
   const auto until = std::chrono::steady_clock::now() + kLoadingAtStart;
   const ServedCells& served = cells();
   for (auto cell = served.begin(); cell != served.end() && std::chrono::steady_clock::now() < until; ++cell)
@@ -113,6 +118,7 @@ Result<bool> Trainer::can_take_up(const StoredJob& job, std::vector<std::string>
     notices.push_back(fmt::format("job {} waits: cell {} is not served here", job.id, job.cell));
     return false;
   }
+  if (cells_.why_apart(job.cell)) return false;  // that is said already
   if (job.state != JobState::kRunning || job.attempts < kMaxAttempts) return true;
   if (store_.is_shared() && !store_.set_job_running(job.id)) return false;  // another server works on it
   const std::string why = fmt::format("its training was interrupted by a crash {} times", job.attempts);
@@ -148,6 +154,7 @@ Result<std::vector<std::string>> Trainer::start() {
   if (store_.is_shared()) {
     // What was taken up before is looked at once more: it may have changed meanwhile.
     follower_ = std::jthread([this](const std::stop_token& stop) { follow(0, stop); });
+    heartbeat_ = std::jthread([this](const std::stop_token& stop) { beat(stop); });
   }
   keeper_ = std::jthread([this, told = troubles()](const std::stop_token& stop) { keep_up(told, stop); });
   reclaimer_ = std::jthread([this](const std::stop_token& stop) {
@@ -194,6 +201,14 @@ std::vector<std::string> Trainer::add_cells(const ServedCells& more) {
   std::vector<StoredJob> jobs = store_.unfinished_jobs().value_or(std::vector<StoredJob>());
   std::erase_if(jobs, [&](const StoredJob& job) { return before.contains(job.cell) || !more.contains(job.cell); });
   cells_.add(more);
+  if (store_.is_shared()) {
+    presence_.describe(more);
+    {
+      const MutexLock look_again(agree_mutex_);
+      descriptions_ = -1;
+    }
+    agree();
+  }
   std::vector<std::string> notices;
   for (const auto& [name, cell] : more) {
     if (before.contains(name)) continue;
@@ -222,68 +237,6 @@ void Trainer::take_up_jobs(std::vector<StoredJob> jobs, std::vector<std::string>
   }
 }
 
-void Trainer::follow(std::int64_t followed, const std::stop_token& stop) {
-  ::pthread_setname_np(::pthread_self(), "follower");
-  while (!stop.stop_requested()) {
-    keep_claim();
-    followed = follow_models(followed);
-    keep_claim();
-    follow_jobs();
-    store_.wait_for_change(stop, kFollowTick);
-  }
-}
-
-std::int64_t Trainer::follow_models(std::int64_t followed) {
-  const auto made = store_.changes_made();
-  if (!made || *made == followed) return followed;
-  const bool lost = *made < followed;
-  if (lost && trouble_listener_)
-    trouble_listener_(fmt::format("the record has {} changes and had {}: it is of an earlier moment", *made, followed),
-                      false);
-  const auto changed = store_.cells_changed_after(lost ? 0 : followed);
-  if (!changed) return followed;
-  bool all = true;
-  for (const std::string& cell : *changed) {
-    if (cells().contains(cell) && !history_.follow(cell)) all = false;
-    keep_claim();  // a record that answers slowly must not end the lease
-  }
-  return all ? *made : followed;
-}
-
-void Trainer::follow_jobs() {
-  const MutexLock lock(submit_mutex_);
-  const auto to_take = store_.jobs_to_take();
-  if (!to_take) return;
-  for (const JobProgress& known : book_.unfinished()) {
-    if (to_take->contains(known.job) || known.job == runner_.claimed()) continue;
-    const auto job = store_.job(known.job);
-    if (!job || !book_.find(known.job)) continue;
-    const bool is_over = job->state == JobState::kDone || job->state == JobState::kFailed;
-    const JobProgress now = stored_progress(*job);
-    if (is_over) static_cast<void>(queue_.remove(known.job));
-    if (is_over || now.stage != known.stage || now.what != known.what) book_.report(now);
-  }
-  std::vector<std::string> notices;  // the start of a server says them
-  const std::set<std::int64_t> known = queue_.jobs();
-  for (const std::int64_t id : *to_take) {
-    if (known.contains(id)) continue;
-    auto job = store_.job(id);
-    const bool is_over = job && (job->state == JobState::kDone || job->state == JobState::kFailed);  // meanwhile
-    if (!job || is_over || !can_take_up(*job, notices).value_or(false)) continue;
-    job->state = JobState::kQueued;
-    enqueue(*job, was_asked_for(*job).value_or(true));
-  }
-}
-
-void Trainer::keep_claim() {
-  const std::int64_t job = runner_.claimed();
-  if (job == 0) return;
-  const auto claim = store_.renew_claim(job);
-  if (!claim) return;  // a record that is away lets nobody else claim it, either
-  if (!claim->is_held) runner_.lose_claim();
-  if (!claim->is_held || claim->cancelled_by) static_cast<void>(queue_.cancel(job, claim->cancelled_by.value_or("")));
-}
-
 void Trainer::tell_troubles(std::vector<std::string>& told) {
   std::vector<std::string> now = troubles();
   if (now == told) return;
@@ -305,6 +258,7 @@ std::vector<std::string> Trainer::troubles() const {
   if (state.why_not_written) all.push_back("the store cannot be written: " + sentence(*state.why_not_written));
   if (!state.clock.empty()) all.push_back(state.clock);
   for (std::string& damage : state.damages) all.push_back(std::move(damage));
+  for (const auto& [cell, why] : cells_.apart()) all.push_back(why);
   for (std::string& trouble : history_.troubles()) {
     if (std::find(all.begin(), all.end(), trouble) == all.end()) all.push_back(std::move(trouble));
   }
@@ -316,6 +270,11 @@ void Trainer::stop() {
   for (std::jthread* thread : {&worker_, &keeper_, &follower_}) thread->request_stop();
   for (std::jthread* thread : {&worker_, &keeper_, &follower_}) {
     if (thread->joinable()) thread->join();
+  }
+  if (heartbeat_.joinable()) {
+    heartbeat_.request_stop();
+    heartbeat_.join();
+    static_cast<void>(store_.take_leave());  // a record that is away finds out by the clock
   }
   reclaimer_.request_stop();
   reclaimer_.join();
@@ -329,7 +288,7 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
 }
 
 Result<std::int64_t> Trainer::take_in(StoredBatch batch) {
-  const auto cell = find_cell(cells(), batch.cell);
+  const auto cell = cells_.find(batch.cell);
   if (!cell) return tl::make_unexpected(cell.error());
   if (auto valid = check_batch_id(batch.id); !valid) return tl::make_unexpected(valid.error());
   const auto received = received_batch({batch.id, batch.csv, batch.accepted_at}, **cell,
@@ -365,7 +324,7 @@ Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::
 
 Result<std::int64_t> Trainer::check(const std::string& cell_name, const std::string& batch_id, const std::string& csv,
                                     std::optional<double> tolerance_mm, const ChangeId& id) {
-  if (find_cell(cells(), cell_name) && !registry_.in_force(cell_name))
+  if (cells_.find(cell_name) && !registry_.in_force(cell_name))
     return failure(ErrorCode::kNotFound, "cell {} has no model in force to hold a check against", cell_name).of("cell");
   StoredJob job;
   job.kind = JobKind::kCheck;
@@ -378,7 +337,7 @@ Result<std::int64_t> Trainer::look_at(StoredJob job, const std::string& batch_id
                                       const ChangeId& id) {
   const std::string& cell_name = job.cell;
   if (const auto before = queued_before(id); !before || *before) return before.map(the_job);
-  const auto cell = find_cell(cells(), cell_name);
+  const auto cell = cells_.find(cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (!batch_id.empty() && !csv.empty()) {
     return failure(ErrorCode::kUsage, "a {} is of a stored batch or of one that is sent, not of both",
@@ -425,7 +384,7 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
                                       const std::string& level, const std::string& bias, Quarantine quarantine,
                                       const ChangeId& id) {
   if (const auto before = queued_before(id); !before || *before) return before.map(the_job);
-  const auto cell = find_cell(cells(), cell_name);
+  const auto cell = cells_.find(cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   if (const Status known = check_spellings(**cell, level, bias); !known) return tl::make_unexpected(known.error());
   if (const Status fits = check_most("batches", batch_ids.size(), kMostBatches, "batches in one training"); !fits)
@@ -488,20 +447,13 @@ Status Trainer::cancel(std::int64_t id, const ChangeId& by) {
   if (!asked_for) return tl::make_unexpected(asked_for.error());
   const auto over = [id] { return failure(ErrorCode::kConflict, "job {} is over", id).of("job").with_value(id); };
   if (job->state == JobState::kDone || job->state == JobState::kFailed) return over();
-  if (store_.is_shared() && job->state == JobState::kRunning) {
-    // Before it is told here: whoever takes the job up if this server dies now ends it, too.
-    if (const Status asked = store_.ask_to_cancel(id, by); !asked) return asked;
-    if (runner_.claimed() == id) static_cast<void>(queue_.cancel(id, by.who));
-    if (runner_.claimed() != id) static_cast<void>(queue_.remove(id));
-    return {};
-  }
+  if (store_.is_shared()) return cancel_in_record(*job, by);
   const JobQueue::Cancelled found = queue_.cancel(id, by.who);
   if (found == JobQueue::Cancelled::kStopping) return {};
-  const bool waited_here = found == JobQueue::Cancelled::kRemoved;
-  if (!waited_here && !store_.is_shared()) return over();  // else it waits on another server
+  if (found == JobQueue::Cancelled::kUnknown) return over();
   const JobOutcome outcome = cancelled_outcome(by.who);
   if (auto ended = store_.set_job_failed(id, outcome.why, outcome, by); !ended) {
-    if (waited_here) queue_.push_front({id, job->cell, *asked_for});  // as if it had not been asked
+    queue_.push_front({id, job->cell, *asked_for});  // as if it had not been asked
     return ended;
   }
   JobProgress progress = progress_of(*job);
@@ -526,7 +478,7 @@ Status Trainer::activate(const std::string& cell, int version, const ChangeId& i
 
 Result<std::optional<GateVerdict>> Trainer::judged_beside_present(const std::string& cell_name, int version) const {
   const std::optional<GateVerdict> nothing_to_judge;
-  const auto cell = find_cell(cells(), cell_name);
+  const auto cell = cells_.find(cell_name);
   if (!cell) return tl::make_unexpected(cell.error());
   const auto present = registry_.in_force(cell_name);
   if (!present || present->version == version) return nothing_to_judge;
@@ -573,12 +525,12 @@ Status Trainer::check_not_worse(const std::string& cell, int version, const Gate
 }
 
 Status Trainer::release(const std::string& cell_name, const std::string& batch_id, const ChangeId& id) {
-  if (const auto found = find_cell(cells(), cell_name); !found) return tl::make_unexpected(found.error());
+  if (const auto found = cells_.find(cell_name); !found) return tl::make_unexpected(found.error());
   return store_.set_quarantine(cell_name, batch_id, "", id);
 }
 
 Status Trainer::discard(const std::string& cell_name, const std::string& batch_id, const ChangeId& id) {
-  if (const auto found = find_cell(cells(), cell_name); !found) return tl::make_unexpected(found.error());
+  if (const auto found = cells_.find(cell_name); !found) return tl::make_unexpected(found.error());
   return store_.discard(cell_name, batch_id, id);
 }
 

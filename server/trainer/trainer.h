@@ -18,6 +18,7 @@
 #include "server/trainer/job_progress.h"
 #include "server/trainer/job_queue.h"
 #include "server/trainer/job_runner.h"
+#include "server/trainer/presence.h"
 #include "server/trainer/trainer_options.h"
 
 namespace trammel {
@@ -98,7 +99,7 @@ class Trainer {
                                            std::optional<double> tolerance_mm, const ChangeId& id = {});
   /// Of a job whose diagnosis or check is found; kBusy while it is not.
   [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
-  /// Ends a job that waits or runs: its outcome is kCancelled, and nothing of it is stored but the findings that a
+  /// Ends a job that waits or runs, here or on another server of the same store: its outcome is kCancelled, and nothing of it is stored but the findings that a
   /// diagnosis already had. The batch that came with it stays, to be trained from when somebody asks. Returns once a
   /// waiting job is stored as ended; a running one ends within a second. Refuses an unknown job (kNotFound) and one
   /// that is over (kConflict).
@@ -140,7 +141,15 @@ class Trainer {
   /// Those that wait or run, oldest first, as they go on. From memory.
   [[nodiscard]] std::vector<JobProgress> unfinished_jobs() const { return book_.unfinished(); }
   /// What is wrong with the models that cells are served with; see ModelHistory.
-  [[nodiscard]] std::map<std::string, CellTrouble> cell_troubles() const { return history_.cell_troubles(); }
+  [[nodiscard]] std::map<std::string, CellTrouble> cell_troubles() const;
+  /// Why this server may not answer for the cell though it has its files; empty: it may.
+  [[nodiscard]] std::optional<std::string> why_apart(const std::string& cell) const { return cells_.why_apart(cell); }
+  /// What this server says of itself.
+  [[nodiscard]] ServerSelf self() const;
+  /// The servers of the record, this one among them, as they were heard of last, without what they serve. From memory.
+  [[nodiscard]] std::vector<ServerInRecord> servers_seen() const;
+  /// The same with what they serve, as the record has it now.
+  [[nodiscard]] Result<std::vector<ServerInRecord>> servers() const;
   /// Waiting, without the one being trained.
   [[nodiscard]] int queued_jobs() const;
 
@@ -160,6 +169,13 @@ class Trainer {
   [[nodiscard]] std::int64_t follow_models(std::int64_t followed);
   /// Which jobs wait, run elsewhere or are over.
   void follow_jobs();
+  /// Compares the files of its cells with the record where either may have changed, and sets those apart that differ.
+  void agree() TRAMMEL_EXCLUDES(agree_mutex_);
+  /// Tells the others that it is there, and keeps the claim on the job that runs. Waits for nobody else's work.
+  void beat(const std::stop_token& stop);
+  /// As it sees itself: nobody else has its store.
+  [[nodiscard]] ServerInRecord alone() const;
+  [[nodiscard]] Status cancel_in_record(const StoredJob& job, const ChangeId& by);
   /// Ends the computing of a job that is no longer this server's, or that somebody cancelled on another one.
   void keep_claim();
   /// Those of cells that are served, as far as they do not wait here already.
@@ -205,7 +221,12 @@ class Trainer {
   JobQueue queue_;
   std::optional<std::vector<StoredJob>> taken_up_;  // between take_up() and start()
   Mutex submit_mutex_;  // one at a time between the look at what is there and the push: who may push
-  std::jthread worker_, keeper_, follower_, reclaimer_;
+  Presence presence_;
+  std::atomic<bool> is_present_ = false;  // the others know of it
+  Mutex agree_mutex_;
+  std::int64_t descriptions_ TRAMMEL_GUARDED_BY(agree_mutex_) = -1;  // those that it has compared with
+  const std::int64_t began_at_;
+  std::jthread worker_, keeper_, follower_, heartbeat_, reclaimer_;
 };
 
 }  // namespace trammel

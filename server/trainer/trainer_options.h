@@ -13,7 +13,8 @@ struct TrainerOptions {
   double validation_share = 0.2;  ///< of the poses of a batch are held out to judge models by (judging_rows())
   double accept_ratio = 1.02;     ///< see GateOptions
   std::uint64_t seed = 1;
-  bool trains = true;  ///< false: jobs wait for another server of the same store
+  bool trains = true;    ///< false: jobs wait for another server of the same store
+  ServerSelf self = {};  ///< what is told of the process to the other servers of the store
   KeepRule keep = {};  ///< what of the store is pruned, after each job
   ComputeOptions compute = {};
 };

@@ -134,5 +134,27 @@ TEST(ServiceText, WhatIsNotInForceComesWithTheNextCommand) {
   EXPECT_EQ(next_step(failed), "next: measure more poses");
 }
 
+TEST(ServiceText, TheServersOfARecordAreThereBehindOrGone) {
+  using nlohmann::ordered_json;
+  const ordered_json record = {{"kind", "postgresql"}, {"place", "postgresql://db/trammel"}, {"reachable", true}};
+  ordered_json one = {{"server", "one"}, {"host", "h1"}, {"version", "0.1.0"}, {"pid", 7}, {"serves", true},
+                      {"trains", true}, {"gone", false}, {"changes_behind", 0}};
+  one["cells"] = {{{"cell", "cell-7"}, {"version", 3}}, {{"cell", "cell-8"}, {"version", 0}, {"why", "other files"}}};
+  ordered_json two = {{"server", "two"}, {"host", "h2"}, {"version", "0.1.0"}, {"pid", 8}, {"serves", false},
+                      {"trains", true}, {"gone", false}, {"changes_behind", 2}};
+  two["works_on"] = {{{"job", 4}, {"cell", "cell-7"}}};
+  const ordered_json gone = {{"server", "three"}, {"host", "h3"}, {"gone", true}, {"heard_unix_s", 1'700'000'000},
+                             {"silent_s", 60}};
+  EXPECT_EQ(servers_text({one, two, gone}, record),
+            "servers of the record:\n"
+            "  one on h1 (0.1.0, process 7): serves 1 cell, trains, up to date\n"
+            "    other files\n"
+            "  two on h2 (0.1.0, process 8): trains, works on job 4 of cell-7, 2 changes behind\n"
+            "  three on h3: gone, not heard of since 2023-11-14 22:13 UTC (60 s)\n");
+  EXPECT_EQ(servers_text(nullptr, record), "which servers are there is not known while the record is away\n");
+  EXPECT_EQ(servers_text({one}, {{"kind", "sqlite"}}), "");
+  EXPECT_EQ(servers_text({1, "x"}, record).substr(0, 23), "servers of the record:\n") << "whatever a server says";
+}
+
 }  // namespace
 }  // namespace trammel::cli

@@ -537,6 +537,23 @@ TEST_F(HandlersTest, ACheckIsQueuedAgainstTheModelInForceAndRefusedWithoutOne) {
   EXPECT_EQ(handlers_.answer(request).error().code, ErrorCode::kUsage);
 }
 
+TEST_F(HandlersTest, WithTheHealthOfAllCellsComesWhichServersThereAre) {
+  auto request = read_request(wire::READ_HEALTH);
+  request.since_unix_s(-1);
+  for (const bool of_all : {true, false}) {
+    request.about().cell(of_all ? "" : "cell-7");
+    const auto reply = handlers_.answer(request);
+    ASSERT_TRUE(reply) << reply.error().message;
+    const auto servers = nlohmann::json::parse(reply->text()).at("servers");
+    ASSERT_EQ(servers.is_null(), !of_all) << "one cell is asked for often";
+    if (!of_all) continue;
+    ASSERT_EQ(servers.size(), 1u) << "a file has one server";
+    EXPECT_EQ(servers[0].at("gone"), false);
+    EXPECT_EQ(servers[0].at("changes_behind"), 0);
+    EXPECT_EQ(servers[0].at("cells").size(), backend_.trainer->cells().size());
+  }
+}
+
 TEST_F(HandlersTest, TheHealthOfACellIsItsChecksTheNextOneAndHowWhatIsInForceWasJudged) {
   const auto read = [this](const std::string& cell, std::uint32_t most) {
     auto request = read_request(wire::READ_HEALTH);

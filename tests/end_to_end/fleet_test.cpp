@@ -2,15 +2,21 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <functional>
 #include <future>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <regex>
 #include <set>
 
 #include "server/base/text_file.h"
 #include "tests/support/daemon.h"
 #include "tests/support/held_answer.h"
+#include "tests/support/http_client.h"
 #include "tests/support/postgres.h"
+#include "tests/support/process.h"
 #include "tests/support/virtual_cell.h"
 
 namespace trammel {
@@ -74,6 +80,55 @@ class Fleet : public testing::Test {
     for (const client::BatchOfService& batch : *all)
       EXPECT_TRUE(ids.insert(batch.batch).second) << batch.batch << " twice";
     return ids;
+  }
+
+  static std::string with_pages(const test::Daemon& daemon) {
+    return fmt::format("http: {{port: {}}}\n", pages_of(daemon));
+  }
+  static std::uint16_t pages_of(const test::Daemon& daemon) { return static_cast<std::uint16_t>(daemon.port() + 1); }
+  static test::HttpAnswer page(const test::Daemon& daemon, const std::string& path) {
+    return test::http_get(pages_of(daemon), path);
+  }
+  /// The servers of the record as this one tells them, by name, without what changes all the time.
+  static std::map<std::string, nlohmann::json> fleet_of(client::Session& session) {
+    std::map<std::string, nlohmann::json> fleet;
+    const auto texts = session.health("", 1);
+    if (!texts || texts->empty()) return fleet;
+    const nlohmann::json told = nlohmann::json::parse(texts->front());
+    for (nlohmann::json server : told["servers"]) {
+      for (const char* key : {"heard_unix_s", "silent_s"}) server.erase(key);
+      const std::string name = server["server"];
+      fleet[name] = std::move(server);
+    }
+    return fleet;
+  }
+  static bool is_gone(client::Session& session, const test::Daemon& daemon) {
+    const auto fleet = fleet_of(session);
+    const auto found = fleet.find(daemon.name());
+    return found != fleet.end() && found->second["gone"] == true;
+  }
+  static std::string command(const std::vector<std::string>& arguments) {
+    std::vector<std::string> line = {TRAMMEL_BINARY_DIR "/clients/trammel"};
+    line.insert(line.end(), arguments.begin(), arguments.end());
+    const auto done = test::run(line);
+    EXPECT_EQ(done.exit_code, 0) << done.out << done.err;
+    return done.out;
+  }
+  static std::filesystem::path cell_file_of(const test::Daemon& daemon) {
+    return std::filesystem::path(daemon.config_path()).parent_path() / "cell-7.yaml";
+  }
+  /// A robot file of its own for this server, the shipped one but for a link's length.
+  static void give_another_robot(const test::Daemon& daemon) {
+    const std::string cell = test::read_file(cell_file_of(daemon));
+    std::smatch named;
+    ASSERT_TRUE(std::regex_search(cell, named, std::regex("\nrobot: (\\S+)")));
+    std::string robot = test::read_file(named[1].str());
+    const std::size_t at = robot.find("d_mm: ");
+    ASSERT_NE(at, std::string::npos);
+    robot.insert(at + 6, "1");
+    ASSERT_TRUE(write_text_file(cell_file_of(daemon).parent_path() / "robot.yaml", robot));
+    ASSERT_TRUE(write_text_file(cell_file_of(daemon),
+                                std::regex_replace(cell, std::regex("\nrobot: \\S+"), "\nrobot: robot.yaml")));
   }
 
   test::Postgres database_;
@@ -257,6 +312,103 @@ TEST_F(Fleet, WhileTheRecordIsAwayPredictionsGoOnAndNothingAcknowledgedIsLost) {
   const auto known = batches(*other);
   EXPECT_TRUE(known.contains("b1"));
   EXPECT_TRUE(known.contains("b3"));
+}
+
+TEST_F(Fleet, EachServerShowsTheSameFleetAndOneThatIsKilledIsSaidToBeGone) {
+  start(first_, with_pages(first_));
+  start(second_, with_pages(second_));
+  start(third_, "serves: false\n" + with_pages(third_));
+  const auto one = session_with({&first_}), other = session_with({&second_});
+  ASSERT_TRUE(end_of(*one, submit(*one, "b1", 1)).in_force);
+  const auto is_served = [](const auto& named) {
+    const nlohmann::json& server = named.second;
+    return server["gone"] == false && server["changes_behind"] == 0 && server["works_on"].empty() &&
+           server["cells"][0]["version"] == 1;
+  };
+  wait_until(
+      [&] {
+        const auto fleet = fleet_of(*one);
+        return fleet.size() == 3 && std::all_of(fleet.begin(), fleet.end(), is_served);
+      },
+      "all are there and have taken up what is in force");
+  const auto fleet = fleet_of(*one);
+  EXPECT_EQ(fleet_of(*other), fleet);
+  EXPECT_EQ(fleet.at(third_.name())["serves"], false) << "it is shown though it answers nobody";
+  EXPECT_EQ(fleet.at(third_.name())["trains"], true);
+  EXPECT_EQ(fleet.at(second_.name())["pid"], second_.process().pid());
+  const auto jobs = one->jobs("cell-7");
+  ASSERT_TRUE(jobs);
+  EXPECT_TRUE(fleet.contains(jobs->front().worker)) << jobs->front().worker;
+  const std::string shown = command({"status", "--service", "--port", std::to_string(first_.port()), "--domain",
+                                     std::to_string(first_.domain())});
+  for (const test::Daemon* daemon : {&first_, &second_, &third_}) {
+    EXPECT_NE(shown.find(daemon->name() + " on "), std::string::npos) << shown;
+    EXPECT_NE(page(*daemon, "/fleet").body.find("All 3 servers are there."), std::string::npos) << "also the last one";
+  }
+
+  third_.kill();
+  wait_until([&] { return is_gone(*one, third_); }, "it is said to be gone");
+  wait_until([&] { return is_gone(*other, third_); }, "also by the other one");
+  wait_until([&] { return page(second_, "/fleet").body.find("1 of 3 servers gone: " + third_.name()) != std::string::npos; },
+             "the page");
+  wait_until([&] { return page(first_, "/readyz").body.find(third_.name() + " on ") != std::string::npos; }, "/readyz");
+  const std::string metrics = page(first_, "/metrics").body;
+  EXPECT_TRUE(std::regex_search(metrics, std::regex("trammel_server_there\\{[^}]*" + third_.name() + "[^}]*\\} 0")))
+      << metrics;
+  EXPECT_NE(metrics.find("trammel_record_reachable 1"), std::string::npos);
+  EXPECT_EQ(second_.stop(), 0);
+  wait_until([&] { return !fleet_of(*one).contains(second_.name()); }, "one that ends takes its leave");
+}
+
+TEST_F(Fleet, ACellThatAServerDescribesOtherwiseIsNotServedThereUntilTheyAgree) {
+  start(first_, with_pages(first_));
+  const auto one = session_with({&first_});
+  ASSERT_TRUE(end_of(*one, submit(*one, "b1", 1)).in_force);
+  const std::string own = test::read_file(cell_file_of(second_));
+  give_another_robot(second_);
+  start(second_, with_pages(second_));
+  const auto other = session_with({&second_}, seconds(4));
+  const auto refused = other->predict_error(kContext, test::virtual_joints(1, 7));
+  ASSERT_FALSE(refused);
+  for (const std::string& said : {sentence(refused.error()), page(second_, "/readyz?cell=cell-7").body,
+                                  second_.process().standard_error(), page(second_, "/fleet").body})
+    EXPECT_NE(said.find(second_.name() + " has another robot file than " + first_.name()), std::string::npos) << said;
+  EXPECT_EQ(page(second_, "/readyz?cell=cell-7").code, 503);
+  EXPECT_EQ(page(first_, "/readyz?cell=cell-7").code, 200);
+  EXPECT_FALSE(other->submit_measurements("cell-7", "b2", test::virtual_batch_csv(60, 2))) << "it is not its cell now";
+  const auto both = session_with({&second_, &first_});
+  EXPECT_TRUE(both->predict_error(kContext, test::virtual_joints(1, 7))) << "the other one answers";
+
+  command({"store", "describe", url_, "--cell", "cell-7", "--as", second_.name()});
+  wait_until([&] { return page(first_, "/readyz?cell=cell-7").body.find("described_otherwise") != std::string::npos; },
+             "now it is the first one that has another file");
+  command({"store", "describe", url_, "--cell", "cell-7", "--as", first_.name()});
+  wait_until([&] { return served(*one) == 1; }, "a person has said whose files count");
+
+  EXPECT_EQ(second_.stop(), 0);
+  ASSERT_TRUE(write_text_file(cell_file_of(second_), own));
+  second_.start();
+  EXPECT_EQ(served(*session_with({&second_})), 1) << "the files agree";
+  EXPECT_NE(command({"audit", "--store", url_}).find(" on " + first_.name()), std::string::npos);
+}
+
+TEST_F(Fleet, AJobIsCancelledOnAnyServerWhetherItWaitsOrRunsElsewhere) {
+  start(first_, "trains: false\n");
+  start(second_, "trains: false\n");
+  const auto one = session_with({&first_}), other = session_with({&second_});
+  const std::int64_t waits = submit(*one, "b1", 1);
+  ASSERT_TRUE(other->cancel(waits)) << "whether it has heard of the job or not";
+  EXPECT_EQ(end_of(*one, waits).stage, "cancelled");
+  start(third_, "serves: false\n");
+  const std::int64_t runs = submit(*one, "b2", 2, 400);
+  ASSERT_TRUE(third_.process().wait_for_line(fmt::format("job {}: ", runs), kLimit)) << "it works on the job";
+  ASSERT_TRUE(other->cancel(runs));
+  const auto over = end_of(*one, runs);
+  EXPECT_EQ(over.stage, "cancelled") << over.what;
+  EXPECT_EQ(over.model_version, 0);
+  const auto jobs = one->jobs("cell-7");
+  ASSERT_TRUE(jobs);
+  EXPECT_EQ(jobs->back().worker, third_.name());
 }
 
 }  // namespace

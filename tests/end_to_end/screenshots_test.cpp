@@ -234,7 +234,7 @@ TEST_F(PagesOfAService, AreWholeAtEverySizeAndEveryLinkLeadsToOneOfThem) {
     }
   }
   for (const char* path : {"/jobs", "/jobs/1", "/jobs/2/findings", "/jobs/3/findings", "/cells/cell-7",
-                           "/cells/cell-7/models/1", "/cells/cell-7/history"})
+                           "/cells/cell-7/models/1", "/cells/cell-7/history", "/fleet"})
     EXPECT_TRUE(seen.contains(path)) << path << " is not reached";
   EXPECT_EQ(daemon_.stop(), 0) << daemon_.process().standard_error();
 }

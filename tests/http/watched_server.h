@@ -16,7 +16,9 @@ namespace trammel::test {
 /// The parts of a server of small cells, without DDS. May be taken down and set up again on the same store.
 class WatchedServer {
  public:
-  explicit WatchedServer(ServedCells cells = {{"cell-7", small_cell("cell-7")}}) : cells_(std::move(cells)) {
+  /// `place`: of the store; empty: a file.
+  explicit WatchedServer(ServedCells cells = {{"cell-7", small_cell("cell-7")}}, const std::string& place = "")
+      : place_(place.empty() ? store_path() : place), cells_(std::move(cells)) {
     set_up();
   }
 
@@ -26,7 +28,8 @@ class WatchedServer {
     store_.reset();
   }
   void set_up(std::size_t budget = ModelRegistry::kNoLimit) {
-    store_ = demand(Store::open(store_path()));
+    store_ = demand(Store::open(place_));
+    store_->works_as("server-a");
     registry_ = std::make_unique<ModelRegistry>(budget);
     trainer_ = std::make_unique<Trainer>(cells_, *store_, *registry_, TrainerOptions());
     trainer_->set_listeners(
@@ -74,6 +77,7 @@ class WatchedServer {
 
  private:
   TemporaryFolder folder_;
+  std::string place_;
   ServedCells cells_;
   std::mutex mutex_;
   std::condition_variable changed_;

@@ -7,6 +7,7 @@
 #include <thread>
 #include <vector>
 
+#include "server/store/database/postgres_database.h"
 #include "tests/store/store_under_test.h"
 #include "tests/support/postgres.h"
 
@@ -113,7 +114,7 @@ TEST_F(Claims, WhoLostAJobThatWasPutBackSinceStoresNothingOfIt) {
 TEST_F(Claims, AJobThatWasToEndEndsAlsoWhereItsServerIsGone) {
   const std::int64_t job = submit("cell-7", "b1");
   ASSERT_TRUE(one_->set_job_running(job));
-  ASSERT_TRUE(other_->ask_to_cancel(job, {"", "", "anna"}));
+  ASSERT_EQ(demand(other_->cancel_job(job, {}, {"", "", "anna"})), CancelledJob::kAsked);
   let_lease_pass(job);
   ASSERT_TRUE(other_->set_job_running(job));
   EXPECT_EQ(demand(other_->renew_claim(job)).cancelled_by, "anna");
@@ -129,11 +130,66 @@ TEST_F(Claims, AServerTakesUpItsOwnJobThatItLeftBehind) {
 
 TEST_F(Claims, WhoRunsAJobHearsThatAnotherServerWasAskedToEndIt) {
   const std::int64_t job = submit("cell-7", "b1");
-  EXPECT_EQ(other_->ask_to_cancel(job, {"", "", "anna"}).error().code, ErrorCode::kConflict) << "nobody works on it";
   ASSERT_TRUE(one_->set_job_running(job));
   EXPECT_FALSE(demand(one_->renew_claim(job)).cancelled_by);
-  ASSERT_TRUE(other_->ask_to_cancel(job, {"", "", "anna"}));
-  EXPECT_EQ(demand(one_->renew_claim(job)).cancelled_by, "anna");
+  std::stop_source never;
+  one_->wait_for_change(never.get_token(), std::chrono::seconds(30));  // connects, and hears from then on
+  ASSERT_EQ(demand(other_->cancel_job(job, {}, {"", "", "anna"})), CancelledJob::kAsked);
+  one_->wait_for_change(never.get_token(), std::chrono::hours(1));
+  EXPECT_EQ(demand(one_->renew_claim(job)).cancelled_by, "anna") << "it is told at once";
+}
+
+TEST_F(Claims, AJobThatWaitsOrWhoseServerIsGoneIsEndedByAnyServer) {
+  const std::int64_t waits = submit("cell-7", "b1"), left = submit("cell-8", "b1");
+  EXPECT_EQ(demand(other_->cancel_job(waits, {}, {"", "", "anna"})), CancelledJob::kEnded);
+  EXPECT_EQ(demand(one_->job(waits)).state, JobState::kFailed);
+  EXPECT_EQ(one_->set_job_running(waits).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(one_->cancel_job(waits, {}, {"", "", "bert"}).error().code, ErrorCode::kConflict) << "it is over";
+  ASSERT_TRUE(one_->set_job_running(left));
+  let_lease_pass(left);
+  EXPECT_EQ(demand(other_->cancel_job(left, {}, {"", "", "anna"})), CancelledJob::kEnded);
+  EXPECT_EQ(one_->set_job_done(left, "late").error().code, ErrorCode::kNotFound);
+  const AuditTrail trail = demand(one_->audit());
+  EXPECT_FALSE(trail.broken);
+  EXPECT_EQ(trail.rows.back().who, "anna");
+  EXPECT_EQ(trail.rows.back().server, "other");
+}
+
+TEST_F(Claims, ABatchIsPutInQuarantineByTheServerThatHasItsJobAlone) {
+  const std::int64_t job = submit("cell-7", "b1");
+  ASSERT_TRUE(one_->set_job_running(job));
+  let_lease_pass(job);
+  ASSERT_TRUE(other_->set_job_running(job));
+  EXPECT_EQ(one_->set_quarantine("cell-7", "b1", "late", {}, job).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(demand(one_->batch_record("cell-7", "b1")).quarantine, "");
+  ASSERT_TRUE(other_->set_quarantine("cell-7", "b1", "moved", {}, job));
+  EXPECT_EQ(demand(one_->batch_record("cell-7", "b1")).quarantine, "moved");
+}
+
+TEST_F(Claims, AClaimIsKeptWhileAllOtherConnectionsOfItsServerWaitForLocks) {
+  const std::int64_t job = submit("cell-7", "b1");
+  ASSERT_TRUE(one_->set_job_running(job));
+  const auto holder = demand(PostgresDatabase::connect(url_, PostgresDatabase::Session::kWrites));
+  {
+    Transaction held(*holder, Transaction::For::kWriting);
+    holder->execute("SELECT 1 FROM audit_end FOR UPDATE");
+    std::atomic<bool> over = false;
+    std::vector<std::jthread> waiting;
+    for (int i = 0; i < 4; ++i)
+      waiting.emplace_back([&, i] {
+        while (!over) static_cast<void>(one_->set_quarantine("cell-7", "b1", std::to_string(i)));
+      });
+    const auto all_wait = [&] {
+      return test::Postgres::of_program().sql(url_,
+                                              "SELECT count(*) FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND "
+                                              "datname = current_database()") == "4\n";
+    };
+    const auto until = std::chrono::steady_clock::now() + std::chrono::minutes(2);
+    while (!all_wait()) ASSERT_LT(std::chrono::steady_clock::now(), until);
+    EXPECT_TRUE(demand(one_->renew_claim(job)).is_held);
+    EXPECT_TRUE(one_->tell_presence({}));
+    over = true;
+  }
 }
 
 TEST_F(Claims, AJobIsToEndOnceUnderOneIdWhicheverServerIsAsked) {
@@ -146,9 +202,9 @@ TEST_F(Claims, AJobIsToEndOnceUnderOneIdWhicheverServerIsAsked) {
   EXPECT_EQ(other_->set_job_failed(waits, "cancelled", {}, {"cancel-3", "cancel", "anna"}).error().code,
             ErrorCode::kNotFound);
   ASSERT_TRUE(one_->set_job_running(runs));
-  ASSERT_TRUE(other_->ask_to_cancel(runs, of_running));
+  ASSERT_EQ(demand(other_->cancel_job(runs, {}, of_running)), CancelledJob::kAsked);
   ASSERT_TRUE(one_->set_job_failed(runs, "cancelled"));
-  EXPECT_TRUE(one_->ask_to_cancel(runs, of_running)) << "nobody works on it any more, and it was asked";
+  EXPECT_EQ(demand(one_->cancel_job(runs, {}, of_running)), CancelledJob::kEnded) << "it is over, and it was asked";
 }
 
 TEST_F(Claims, AServerHearsOfAChangeOfAnotherAndWhichCellItWas) {

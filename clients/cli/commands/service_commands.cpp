@@ -127,6 +127,13 @@ ordered_json record_of(const std::vector<ordered_json>& answers) {
   return answers.empty() ? ordered_json() : answers.front().value("record", ordered_json());
 }
 
+/// The servers of the record, as the first says that can; null: none can.
+ordered_json fleet_of(const std::vector<ordered_json>& answers) {
+  for (const ordered_json& answer : answers)
+    if (answer.contains("servers") && answer["servers"].is_array()) return answer["servers"];
+  return nullptr;
+}
+
 Status status(client::Session& session, const ServiceArguments& arguments) {
   const Result<std::vector<client::ServerStatus>> servers = session.servers();
   if (!servers) return tl::make_unexpected(servers.error());
@@ -148,10 +155,12 @@ Status status(client::Session& session, const ServiceArguments& arguments) {
     list.back().update(part_of(server.server_id, *answers));
   }
   const ordered_json record = record_of(*answers);
-  text += record_text(record);
+  const ordered_json fleet = fleet_of(*answers);
+  text += record_text(record) + servers_text(fleet, record);
   tell(text + models_text(*models) + checked + jobs_text(*jobs) + quarantine_text(*apart), {arguments.json});
   return write_json(arguments.json, {{"record", record},
                                      {"servers", list},
+                                     {"fleet", fleet},
                                      {"models", models_json(*models)},
                                      {"health", health},
                                      {"jobs", jobs_json(*jobs)},

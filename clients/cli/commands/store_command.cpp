@@ -1,3 +1,6 @@
+#include <pwd.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 
 #include "clients/cli/commands/commands.h"
@@ -5,6 +8,7 @@
 #include "clients/cli/terminal/output.h"
 #include "server/store/moved.h"
 #include "server/store/store_copy.h"
+#include "server/store/store_describe.h"
 #include "server/store/store_init.h"
 #include "server/store/store_place.h"
 
@@ -13,7 +17,7 @@ namespace trammel::cli {
 namespace {
 
 struct StoreArguments {
-  std::string place, to, role, json;
+  std::string place, to, role, cell, server, json;
   bool keep_source = false;
 };
 
@@ -69,6 +73,55 @@ Status reopen(const StoreArguments& arguments) {
   return write_json(arguments.json, {{"place", place}});
 }
 
+std::string text_of(const std::vector<CellInRecord>& cells) {
+  std::string text = cells.empty() ? "no server has told of a cell\n" : "";
+  for (const CellInRecord& one : cells) {
+    text += fmt::format("{}: as {} has it\n", one.cell, one.server);
+    for (const CellOfServer& server : one.servers)
+      text += fmt::format("  {} (on {}{}): {}\n", server.server, server.host, server.is_gone ? ", gone" : "",
+                          server.differs.empty() ? "the same" : "another " + server.differs);
+  }
+  return text;
+}
+
+nlohmann::ordered_json json_of(const std::vector<CellInRecord>& cells) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const CellInRecord& one : cells) {
+    nlohmann::ordered_json servers = nlohmann::ordered_json::array();
+    for (const CellOfServer& server : one.servers)
+      servers.push_back({{"server", server.server},
+                         {"host", server.host},
+                         {"gone", server.is_gone},
+                         {"differs", server.differs}});
+    list.push_back({{"cell", one.cell},
+                    {"server", one.server},
+                    {"since_unix_s", one.since},
+                    {"cell_file", one.files.cell},
+                    {"robot_file", one.files.robot},
+                    {"servers", std::move(servers)}});
+  }
+  return list;
+}
+
+/// Who gives a command, for the audit trail.
+std::string who_asks() {
+  const ::passwd* user = ::getpwuid(::getuid());
+  return fmt::format("{} by trammel store describe", user == nullptr ? std::to_string(::getuid()) : user->pw_name);
+}
+
+Status describe(const StoreArguments& arguments) {
+  if (arguments.cell.empty() != arguments.server.empty())
+    return failure(ErrorCode::kUsage, "--cell and --as go together: whose files of the cell count").of("--as");
+  if (!arguments.cell.empty()) {
+    const Status told = describe_cell(arguments.place, arguments.cell, arguments.server, who_asks());
+    if (!told) return told;
+  }
+  const auto cells = described_cells(arguments.place);
+  if (!cells) return tl::make_unexpected(cells.error());
+  tell(text_of(*cells), {arguments.json});
+  return write_json(arguments.json, {{"place", spoken_place(arguments.place)}, {"cells", json_of(*cells)}});
+}
+
 using Run = Status (*)(const StoreArguments&);
 
 CLI::App* add(CLI::App& store, Action& chosen, const char* name, const char* what, Run run,
@@ -107,6 +160,15 @@ void add_store_command(CLI::App& app, Action& chosen) {
   CLI::App* reopened = add(*store, chosen, "reopen", "Have a store served again that was moved, since TO is given up",
                            reopen, arguments);
   reopened->add_option("STORE", arguments->place, "A file, or a URL of PostgreSQL")->required();
+  CLI::App* described = add(*store, chosen, "describe",
+                            "Show whose files each cell goes by among the servers of one record, or choose", describe,
+                            arguments);
+  described->add_option("URL", arguments->place, "postgresql://ROLE@HOST/DATABASE, as a server of it has it")
+      ->required();
+  described->add_option("--cell", arguments->cell, "Cell whose description is chosen");
+  described->add_option("--as", arguments->server,
+                        "Server whose cell file and robot file count from now on; who has others does not answer for "
+                        "the cell until it has the same");
 }
 
 }  // namespace trammel::cli

@@ -27,6 +27,7 @@ std::string row_text(const AuditRow& row) {
                                  row.cell.empty() ? "" : "cell " + row.cell + ", ", row.what, row.subject);
   if (const std::string change = change_text(row); !change.empty()) text += ": " + change;
   text += ", by " + row.who;
+  if (!row.server.empty()) text += " on " + row.server;
   if (!row.why.empty()) text += " (" + row.why + ")";
   return shown(text) + "\n";
 }

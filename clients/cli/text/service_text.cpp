@@ -87,7 +87,7 @@ ordered_json jobs_json(const std::vector<client::DatedJob>& jobs) {
   ordered_json list = ordered_json::array();
   for (const client::DatedJob& job : jobs) {
     ordered_json one = job_json(job.status);
-    one.update({{"server", job.server},
+    one.update({{"server", job.worker.empty() ? job.server : job.worker},
                 {"kind", job.kind},
                 {"batches", job.batches},
                 {"created_unix_s", job.created_unix_s},
@@ -170,15 +170,75 @@ ordered_json server_json(const client::ServerStatus& server) {
           {"queued_jobs", server.queued_jobs}};
 }
 
+namespace {
+
+/// Members of what a server says, whose bytes come from outside.
+std::string word_in(const ordered_json& object, const char* key) {
+  const bool is_there = object.is_object() && object.contains(key) && object[key].is_string();
+  return is_there ? object[key].get<std::string>() : std::string();
+}
+
+std::int64_t number_in(const ordered_json& object, const char* key) {
+  const bool is_there = object.is_object() && object.contains(key) && object[key].is_number_integer();
+  return is_there ? object[key].get<std::int64_t>() : 0;
+}
+
+bool says_yes(const ordered_json& object, const char* key) {
+  return object.is_object() && object.contains(key) && object[key] == true;
+}
+
+const ordered_json& list_in(const ordered_json& object, const char* key) {
+  static const ordered_json kNone = ordered_json::array();
+  const bool is_there = object.is_object() && object.contains(key) && object[key].is_array();
+  return is_there ? object[key] : kNone;
+}
+
+/// `serves 3 cells, trains, works on job 7 of cell-7`.
+std::string part_text(const ordered_json& server) {
+  std::size_t served = 0;
+  for (const ordered_json& cell : list_in(server, "cells")) served += number_in(cell, "version") > 0 ? 1 : 0;
+  std::vector<std::string> parts;
+  if (says_yes(server, "serves")) parts.push_back(fmt::format("serves {} cell{}", served, served == 1 ? "" : "s"));
+  if (says_yes(server, "trains")) parts.push_back("trains");
+  for (const ordered_json& job : list_in(server, "works_on"))
+    parts.push_back(fmt::format("works on job {} of {}", number_in(job, "job"), word_in(job, "cell")));
+  const std::int64_t behind = number_in(server, "changes_behind");
+  parts.push_back(behind == 0 ? "up to date" : fmt::format("{} change{} behind", behind, behind == 1 ? "" : "s"));
+  return fmt::format("{}", fmt::join(parts, ", "));
+}
+
+}  // namespace
+
 std::string record_text(const ordered_json& record) {
-  const auto word = [&record](const char* key) {
-    const bool is_there = record.is_object() && record.contains(key) && record[key].is_string();
-    return is_there ? record[key].get<std::string>() : std::string();
-  };
-  if (word("kind") != "postgresql") return "";
-  if (record.value("reachable", ordered_json()) != true)
-    return fmt::format("record: {} is away; what is in force is served, and every change is refused\n", word("place"));
-  return fmt::format("record: {}; an acknowledged change survives {}\n", word("place"), word("survives"));
+  if (word_in(record, "kind") != "postgresql") return "";
+  const std::string place = word_in(record, "place");
+  if (!says_yes(record, "reachable"))
+    return fmt::format("record: {} is away since {} UTC; what is in force is served, and every change is refused\n", place,
+                       date_text(number_in(record, "away_since_unix_s")));
+  const bool is_unsafe = record.contains("trail_is_safe") && record["trail_is_safe"] == false;
+  return fmt::format("record: {}; an acknowledged change survives {}\n", place, word_in(record, "survives")) +
+         (is_unsafe ? "record: the servers' role could change the audit trail; trammel store init --grant lets in one that "
+                      "cannot\n"
+                    : "");
+}
+
+std::string servers_text(const ordered_json& servers, const ordered_json& record) {
+  if (word_in(record, "kind") != "postgresql") return "";
+  if (!servers.is_array()) return "which servers are there is not known while the record is away\n";
+  std::string text;
+  for (const ordered_json& server : servers) {
+    const std::string who = fmt::format("{} on {}", word_in(server, "server"), word_in(server, "host"));
+    if (says_yes(server, "gone")) {
+      text += fmt::format("  {}: gone, not heard of since {} UTC ({} s)\n", who,
+                          date_text(number_in(server, "heard_unix_s")), number_in(server, "silent_s"));
+      continue;
+    }
+    text += fmt::format("  {} ({}, process {}): {}\n", who, word_in(server, "version"), number_in(server, "pid"),
+                        part_text(server));
+    for (const ordered_json& cell : list_in(server, "cells"))
+      if (const std::string why = word_in(cell, "why"); !why.empty()) text += fmt::format("    {}\n", why);
+  }
+  return "servers of the record:\n" + text;
 }
 
 std::string quarantine_text(const std::vector<client::BatchOfService>& batches) {

@@ -25,6 +25,9 @@ namespace trammel::cli {
 /// Of `record` as a server says it; empty where that is a file beside the server.
 [[nodiscard]] std::string record_text(const nlohmann::ordered_json& record);
 
+/// The servers of the record as one of them tells; null: it cannot say. Empty where the record is a file.
+[[nodiscard]] std::string servers_text(const nlohmann::ordered_json& servers, const nlohmann::ordered_json& record);
+
 [[nodiscard]] nlohmann::ordered_json quarantine_json(const std::vector<client::BatchOfService>& batches);
 [[nodiscard]] std::string quarantine_text(const std::vector<client::BatchOfService>& batches);
 

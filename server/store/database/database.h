@@ -117,6 +117,10 @@ class Database {
   /// between two statements.
   virtual void take_long() {}
 
+  /// The server that writes, for the audit trail; empty: one that has the store alone, or a command.
+  void written_by(std::string server) { writer_ = std::move(server); }
+  [[nodiscard]] const std::string& writer() const { return writer_; }
+
   /// Work that the open transaction does as its last, just before it is committed: what everybody waits for is locked
   /// for as short as can be, and always in the same order.
   void at_end(std::function<void(Database&)> work) { last_.push_back(std::move(work)); }
@@ -128,6 +132,7 @@ class Database {
   virtual void roll_back() noexcept = 0;
 
   std::vector<std::function<void(Database&)>> last_;
+  std::string writer_;
 };
 
 /// Everything until commit(), or nothing. What it reads is of one moment if it only reads.

@@ -134,7 +134,7 @@ Result<CompensatedModel> ModelHistory::load_for_service(const std::string& cell,
 
 Status ModelHistory::activate(const std::string& cell, int version, const ChangeId& id,
                               const std::optional<GateVerdict>& judged) {
-  if (auto found = find_cell(cells_.now(), cell); !found) return tl::make_unexpected(found.error());
+  if (auto found = cells_.find(cell); !found) return tl::make_unexpected(found.error());
   const auto made = store_.outcome_of(id);
   if (!made) return tl::make_unexpected(made.error());
   if (*made) return {};
@@ -187,7 +187,7 @@ Result<std::pair<int, ServedModelPtr>> ModelHistory::load_first(const std::strin
 }
 
 Result<int> ModelHistory::rollback(const std::string& cell, const ChangeId& id) {
-  if (auto found = find_cell(cells_.now(), cell); !found) return tl::make_unexpected(found.error());
+  if (auto found = cells_.find(cell); !found) return tl::make_unexpected(found.error());
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
     const auto made = store_.outcome_of(id);
     if (!made) return tl::make_unexpected(made.error());
@@ -218,7 +218,7 @@ Result<int> ModelHistory::rollback(const std::string& cell, const ChangeId& id) 
 
 Result<CompensatedModel> ModelHistory::model_from(const std::string& cell, const std::string& text,
                                                   const char* what) const {
-  const auto served = find_cell(cells_.now(), cell);
+  const auto served = cells_.find(cell);
   if (!served) return tl::make_unexpected(served.error());
   auto model = deserialize(text, what);
   if (!model) return model;

@@ -44,6 +44,7 @@ struct CellTrouble {
   enum class Kind {
     kOfAnotherRobot,  ///< not served: its robot or its tools are not the model's
     kUnreadable,      ///< not served: no version in force can be read
+    kSetApart,        ///< not served here: another server has other files of the cell
     kOlderServed,     ///< served with an older version
     kCopyServed       ///< served with the right one, which only its copy still has
   } kind = Kind::kUnreadable;

@@ -1,0 +1,12 @@
+#pragma once
+
+#include "server/http/page_shell.h"
+#include "server/http/watched.h"
+
+namespace trammel {
+
+/// The servers of the record, the cells that they serve and the jobs that are not over: one page, whichever server shows
+/// it.
+[[nodiscard]] ServicePage servers_page(const Watched& server);
+
+}  // namespace trammel

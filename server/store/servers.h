@@ -1,0 +1,58 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "server/robot/cell_description.h"
+
+/// The servers of a record: who is there, and what each of them does.
+namespace trammel {
+
+/// How often a server says that it is there. One that was not heard of for three of them is gone.
+constexpr std::chrono::seconds kHeartbeat{5};
+constexpr std::chrono::seconds kGoneAfter = 3 * kHeartbeat;
+
+/// What a server has of one cell.
+struct CellAtServer {
+  int version = 0;  ///< that it answers with; 0: none
+  CellDescription files;
+  std::string why_not = {};  ///< why it does not answer for the cell, one sentence; empty: it does, or has no model
+  bool operator==(const CellAtServer&) const = default;
+};
+
+/// What a server says of itself.
+struct ServerSelf {
+  std::string server;  ///< its name
+  std::string host;
+  std::int64_t pid = 0;
+  std::string program;  ///< its version
+  bool serves = true, trains = true;
+  std::map<std::string, CellAtServer> cells = {};
+  std::int64_t followed = 0;  ///< so many changes of the record it has taken up
+
+  /// Of this process.
+  [[nodiscard]] static ServerSelf here(std::string program, bool serves, bool trains);
+};
+
+/// A job that a server works on.
+struct JobAtServer {
+  std::int64_t job = 0;
+  std::string cell;
+  bool operator==(const JobAtServer&) const = default;
+};
+
+/// A server as the record knows it. Times are Unix time in s, by the record's clock.
+struct ServerInRecord {
+  ServerSelf self;
+  std::int64_t since = 0;     ///< when it began
+  std::int64_t heard_at = 0;  ///< when it was heard of last
+  std::int64_t silent_s = 0;  ///< for so long it has not been heard of
+  bool is_gone = false;       ///< it was not heard of for three heartbeats
+  std::int64_t behind = 0;    ///< so many changes it has not taken up
+  std::vector<JobAtServer> works_on = {};
+};
+
+}  // namespace trammel
