@@ -252,11 +252,12 @@ Result<ReadModelsReply> Handlers::health_of(const std::string& cell, std::int64_
     cells.push_back(cell_health_json(*health));
   }
   ReadModelsReply reply;
-  const nlohmann::ordered_json answer = {{"server", store_.server()},
-                                         {"trains", trainer_.trains()},
-                                         {"record", record_json(store_.record())},
-                                         {"servers", cell.empty() ? servers_of(trainer_) : nlohmann::ordered_json(nullptr)},
-                                         {"cells", std::move(cells)}};
+  const nlohmann::ordered_json answer = {
+      {"server", store_.server()},
+      {"trains", trainer_.trains()},
+      {"record", record_json(store_.record())},
+      {"servers", cell.empty() ? servers_of(trainer_) : nlohmann::ordered_json(nullptr)},
+      {"cells", std::move(cells)}};
   reply.text(answer.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   if (const Status fits = check_fits("the health of cells", reply.text().size()); !fits)
     return Failure(fits.error()).next("ask for fewer checks");

@@ -245,11 +245,11 @@ ServicePage fleet_page(const Watched& server) {
   const auto running = server.trainer.unfinished_jobs().size();
   const std::string body =
       html_section("Now",
-                   fmt::format("<p class=\"verdict\">{}</p>{}<p>{}: {} wait or run. {}: who serves and trains.</p><p class=\"note\">{} {}, read "
+                   fmt::format("<p class=\"verdict\">{}</p>{}<p>{}: {} wait or run. {}: who serves and trains.</p><p "
+                               "class=\"note\">{} {}, read "
                                "again every {} s.</p>",
                                verdict, still, html_link("/jobs", "Jobs"), running, html_link("/fleet", "Servers"),
-                               html_text(server.server_id),
-                               html_text(server.program_version), kLiveAgain)) +
+                               html_text(server.server_id), html_text(server.program_version), kLiveAgain)) +
       troubles_of(server) +
       html_section("Cells",
                    table({"cell", "state", "version", "trained (UTC)", "age of its data", "held-out rms, mm"}, rows));

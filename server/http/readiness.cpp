@@ -92,8 +92,8 @@ std::vector<std::string> notes_of(const Watched& server) {
   notes.insert(notes.end(), state.damages.begin(), state.damages.end());
   for (const ServerInRecord& one : server.trainer.servers_seen()) {
     if (one.is_gone)
-      notes.push_back(fmt::format("server {} on {} is gone: not heard of for {} s", one.self.server, one.self.host,
-                                  one.silent_s));
+      notes.push_back(
+          fmt::format("server {} on {} is gone: not heard of for {} s", one.self.server, one.self.host, one.silent_s));
   }
   return notes;
 }

@@ -45,13 +45,15 @@ std::string work_of(const ServerInRecord& one) {
 }
 
 HtmlRow server_row(const ServerInRecord& one) {
-  const std::string state = one.is_gone ? fmt::format("gone for {}<br><span class=\"note\">not heard of since {}</span>",
-                                                      shown_age(static_cast<double>(one.silent_s)),
-                                                      html_time(one.heard_at))
-                                        : "there";
+  const std::string state = one.is_gone
+                                ? fmt::format("gone for {}<br><span class=\"note\">not heard of since {}</span>",
+                                              shown_age(static_cast<double>(one.silent_s)), html_time(one.heard_at))
+                                : "there";
   return {{html_text(one.self.server), html_text(one.self.host), state, one.is_gone ? "–" : served_by(one),
            one.is_gone ? "–" : work_of(one),
-           one.is_gone ? "–" : one.behind == 0 ? "up to date" : counted(static_cast<std::size_t>(one.behind), "change"),
+           one.is_gone       ? "–"
+           : one.behind == 0 ? "up to date"
+                             : counted(static_cast<std::size_t>(one.behind), "change"),
            html_text(one.self.program), html_time(one.since)},
           one.is_gone ? "dark" : "served"};
 }
@@ -65,8 +67,7 @@ struct CellOfFleet {
 std::string versions_text(const CellOfFleet& cell) {
   std::string text;
   for (const auto& [version, names] : cell.by_version)
-    text += (text.empty() ? "" : "<br>") +
-            html_text(fmt::format("version {}: {}", version, fmt::join(names, ", ")));
+    text += (text.empty() ? "" : "<br>") + html_text(fmt::format("version {}: {}", version, fmt::join(names, ", ")));
   return text.empty() ? "nobody" : text;
 }
 
@@ -101,14 +102,13 @@ std::string jobs_section(const Result<std::vector<StoredJob>>& jobs) {
   for (const StoredJob& job : *jobs) {
     if (job.state != JobState::kQueued && job.state != JobState::kRunning) continue;
     const bool runs = job.state == JobState::kRunning;
-    rows.push_back({{html_link(fmt::format("/jobs/{}", job.id), std::to_string(job.id)),
-                     html_text(job.cell), runs ? "runs on " + html_text(job.server) : "waits",
-                     html_time(job.created_at)},
+    rows.push_back({{html_link(fmt::format("/jobs/{}", job.id), std::to_string(job.id)), html_text(job.cell),
+                     runs ? "runs on " + html_text(job.server) : "waits", html_time(job.created_at)},
                     runs ? "now" : ""});
   }
-  return html_section("Jobs that are not over",
-                      rows.empty() ? "<p>None. " + html_link("/jobs", "Those that ended") + "</p>"
-                                   : table({"job", "cell", "state", "asked (UTC)"}, rows));
+  return html_section("Jobs that are not over", rows.empty()
+                                                    ? "<p>None. " + html_link("/jobs", "Those that ended") + "</p>"
+                                                    : table({"job", "cell", "state", "asked (UTC)"}, rows));
 }
 
 std::string verdict_of(const Servers& servers) {
@@ -122,9 +122,10 @@ std::string verdict_of(const Servers& servers) {
 
 std::string record_line(const RecordState& record) {
   if (!record.reachable)
-    return fmt::format("<p>The record {} is away since {} UTC: what is in force is served, and every change is refused."
-                       "</p>",
-                       html_text(record.place), html_time(record.away_since));
+    return fmt::format(
+        "<p>The record {} is away since {} UTC: what is in force is served, and every change is refused."
+        "</p>",
+        html_text(record.place), html_time(record.away_since));
   return fmt::format("<p>Record: {}. An acknowledged change survives {}.</p>", html_text(record.place),
                      html_text(record.survives));
 }
@@ -135,16 +136,17 @@ ServicePage servers_page(const Watched& server) {
   const auto servers = server.trainer.servers();
   const RecordState record = server.store.record();
   if (!servers) {
-    const std::string body = html_section(
-        "Now", "<p class=\"verdict\">Which servers are there is not known.</p>" + record_line(record));
+    const std::string body =
+        html_section("Now", "<p class=\"verdict\">Which servers are there is not known.</p>" + record_line(record));
     return {"Servers of the record", body, kLiveAgain};
   }
   std::vector<HtmlRow> rows;
   for (const ServerInRecord& one : *servers) rows.push_back(server_row(one));
   const std::string body =
-      html_section("Now", fmt::format("<p class=\"verdict\">{}</p>{}<p class=\"note\">The same page on each of them; read "
-                                      "again every {} s.</p>",
-                                      html_text(verdict_of(*servers)), record_line(record), kLiveAgain)) +
+      html_section("Now",
+                   fmt::format("<p class=\"verdict\">{}</p>{}<p class=\"note\">The same page on each of them; read "
+                               "again every {} s.</p>",
+                               html_text(verdict_of(*servers)), record_line(record), kLiveAgain)) +
       html_section("Servers", table({"server", "host", "state", "serves", "trains", "behind the record by", "program",
                                      "began (UTC)"},
                                     rows)) +

@@ -10,27 +10,18 @@ namespace {
 using nlohmann::ordered_json;
 
 ordered_json row_json(const AuditRow& row) {
-  return {{"number", row.number},
-          {"at_unix_s", row.at},
-          {"who", row.who},
-          {"server", row.server},
-          {"cell", row.cell},
-          {"what", row.what},
-          {"subject", row.subject},
-          {"before", row.before},
-          {"after", row.after},
-          {"why", row.why},
-          {"request", row.request},
-          {"hash_before", row.hash_before},
+  return {{"number", row.number}, {"at_unix_s", row.at}, {"who", row.who},         {"server", row.server},
+          {"cell", row.cell},     {"what", row.what},    {"subject", row.subject}, {"before", row.before},
+          {"after", row.after},   {"why", row.why},      {"request", row.request}, {"hash_before", row.hash_before},
           {"hash", row.hash}};
 }
 
 AuditRow row_of(const nlohmann::json& json) {
   const auto text = [&json](const char* key) { return json.at(key).get<std::string>(); };
-  AuditRow row{json.at("number"), json.at("at_unix_s"), text("who"),         text("cell"),
-               text("what"),      text("subject"),      text("before"),      text("after"),
-               text("why"),       text("request"),      text("hash_before"), text("hash"),
-               json.value("server", "")};
+  AuditRow row{
+      json.at("number"),       json.at("at_unix_s"), text("who"), text("cell"),    text("what"),        text("subject"),
+      text("before"),          text("after"),        text("why"), text("request"), text("hash_before"), text("hash"),
+      json.value("server", "")};
   return row;
 }
 

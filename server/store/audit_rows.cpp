@@ -27,8 +27,8 @@ End end_of(Database& database, const std::string& sql = kEnd) {
 
 AuditRow row_of(Rows& row) {
   const auto text = [&row](int column) { return row.text(column); };
-  return {row.integer64(0), row.integer64(1), text(2), text(3), text(4),  text(5),
-          text(6),          text(7),          text(8), text(9), text(10), text(11), text(12)};
+  return {row.integer64(0), row.integer64(1), text(2), text(3),  text(4),  text(5), text(6),
+          text(7),          text(8),          text(9), text(10), text(11), text(12)};
 }
 
 }  // namespace
@@ -38,17 +38,19 @@ namespace {
 void append(Database& database, const AuditEntry& entry, const ChangeId& by) {
   const End end = end_of(database, locked(database, kEnd));
   AuditRow row{
-      end.rows + 1, unix_now(),  by.who.empty() ? "service" : by.who,       entry.cell, entry.what, entry.subject,
-      entry.before, entry.after, entry.why.empty() ? by.reason : entry.why, by.id,      end.hash,   {}, database.writer()};
+      end.rows + 1,     unix_now(),  by.who.empty() ? "service" : by.who,       entry.cell, entry.what, entry.subject,
+      entry.before,     entry.after, entry.why.empty() ? by.reason : entry.why, by.id,      end.hash,   {},
+      database.writer()};
   row.hash = hash_of(row);
   // The row before is looked at in the same statement: of a store that was moved services know only when they connect.
-  const int added = change(
-      database,
-      "INSERT INTO audit (number, at, who, cell, what, subject, before, after, why, request, hash_before, hash, server) "
-      "SELECT CAST($1 AS BIGINT), CAST($2 AS BIGINT), $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13 "
-      "WHERE $5 = 'reopen' OR NOT EXISTS (SELECT 1 FROM audit WHERE number = $1 - 1 AND what = 'moved')",
-      row.number, row.at, row.who, row.cell, row.what, row.subject, row.before, row.after, row.why, row.request,
-      row.hash_before, row.hash, row.server);
+  const int added =
+      change(database,
+             "INSERT INTO audit (number, at, who, cell, what, subject, before, after, why, request, hash_before, hash, "
+             "server) "
+             "SELECT CAST($1 AS BIGINT), CAST($2 AS BIGINT), $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13 "
+             "WHERE $5 = 'reopen' OR NOT EXISTS (SELECT 1 FROM audit WHERE number = $1 - 1 AND what = 'moved')",
+             row.number, row.at, row.who, row.cell, row.what, row.subject, row.before, row.after, row.why, row.request,
+             row.hash_before, row.hash, row.server);
   if (added == 0) throw DatabaseError(DatabaseError::Kind::kAway, "was moved elsewhere: its audit trail says where to");
   change(database, "UPDATE audit_end SET rows = $1, hash = $2", row.number, row.hash);
   // However often a transaction says it, others hear it once.

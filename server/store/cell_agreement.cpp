@@ -32,9 +32,8 @@ bool describes_so(const ServerInRecord& server, const std::string& cell, const C
 
 std::string why_not(const std::string& cell, const std::string& me, const DescribedCell& known,
                     const CellDescription& mine, const std::vector<const ServerInRecord*>& having) {
-  const auto holder = std::find_if(having.begin(), having.end(), [&](const ServerInRecord* one) {
-    return describes_so(*one, cell, known.files);
-  });
+  const auto holder = std::find_if(having.begin(), having.end(),
+                                   [&](const ServerInRecord* one) { return describes_so(*one, cell, known.files); });
   const std::string whose = holder != having.end()
                                 ? fmt::format("than {} (on {})", (*holder)->self.server, (*holder)->self.host)
                                 : fmt::format("than {} had", known.server == me ? "it" : known.server);
@@ -48,10 +47,7 @@ std::string why_not(const std::string& cell, const std::string& me, const Descri
 class Comparison {
  public:
   Comparison(Database& database, const Worker& worker, bool starts)
-      : database_(database),
-        worker_(worker),
-        starts_(starts),
-        others_(server_rows(database, true, worker.token)) {}
+      : database_(database), worker_(worker), starts_(starts), others_(server_rows(database, true, worker.token)) {}
 
   void compare(const std::string& cell, const CellDescription& mine) {
     lock_cell(database_, cell);
@@ -79,7 +75,8 @@ class Comparison {
   }
 
  private:
-  [[nodiscard]] bool may_change(const std::string& cell, const DescribedCell& known, const CellDescription& mine) const {
+  [[nodiscard]] bool may_change(const std::string& cell, const DescribedCell& known,
+                                const CellDescription& mine) const {
     const auto having = who_has(others_, cell);
     if (having.empty()) return starts_ && known.server == worker_.server;
     return std::all_of(having.begin(), having.end(),

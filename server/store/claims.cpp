@@ -113,9 +113,10 @@ Result<CancelledJob> Store::cancel_job(std::int64_t job, const JobOutcome& outco
     const bool waits = exists(database, "SELECT 1 FROM jobs WHERE id = $1 AND state = 'queued'", job);
     const bool runs = exists(database, "SELECT 1 FROM jobs WHERE id = $1 AND state = 'running'", job);
     if (!waits && !runs) return failure(ErrorCode::kConflict, "job {} is over", job).of("job").with_value(job);
-    const int heard = waits ? 0
-                            : change(database, "UPDATE job_claims SET cancelled_by = $1 WHERE job = $2 AND lease_until > $3",
-                                     by.who, job, now_of(database));
+    const int heard =
+        waits ? 0
+              : change(database, "UPDATE job_claims SET cancelled_by = $1 WHERE job = $2 AND lease_until > $3", by.who,
+                       job, now_of(database));
     // Nobody works on it, or nobody who lives.
     if (heard == 0) static_cast<void>(fail_job(database, job, outcome.why, outcome, by));
     if (database.is_shared()) static_cast<void>(exists(database, "SELECT pg_notify($1, '')", kChangesChannel));

@@ -245,8 +245,9 @@ Result<StoredJob> queue_once(Database& database, const StoredJob& job, const Cha
 
 bool fail_job(Database& database, std::int64_t id, const std::string& message, const JobOutcome& outcome,
               const ChangeId& by) {
-  if (change(database, "UPDATE jobs SET state = 'failed', message = $1 WHERE id = $2 AND state IN ('queued', 'running')",
-             message, id) != 1)
+  if (change(database,
+             "UPDATE jobs SET state = 'failed', message = $1 WHERE id = $2 AND state IN ('queued', 'running')", message,
+             id) != 1)
     return false;
   record_end(database, id, outcome);
   record_job_end(database, id, to_text(outcome.verdict), message, by);

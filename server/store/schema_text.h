@@ -24,8 +24,8 @@ extern const char* const kTablesGone;
 extern const char* const kAuditTables;
 extern const char* const kAuditServer;  ///< what was added to them: which server made the change
 
-/// Of a store that several servers share: who is there, by the starts of servers (`token`), and how cells are described.
-/// The newest description of a cell is the one that the record goes by.
+/// Of a store that several servers share: who is there, by the starts of servers (`token`), and how cells are
+/// described. The newest description of a cell is the one that the record goes by.
 extern const char* const kTablesOfServers;
 
 [[nodiscard]] std::string in_sqlite(std::string tables);

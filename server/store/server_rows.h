@@ -17,7 +17,7 @@ namespace trammel {
 /// The description of a cell that the record goes by.
 struct DescribedCell {
   CellDescription files;
-  std::string server;  ///< whose it was
+  std::string server;   ///< whose it was
   std::int64_t at = 0;  ///< Unix time, s, by the database's clock
 };
 [[nodiscard]] std::map<std::string, DescribedCell> cell_descriptions(Database& database);

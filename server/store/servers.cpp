@@ -44,8 +44,8 @@ std::map<std::string, CellAtServer> cells_spelled(const std::string& text) {
 /// The row as a whole. A start before this one on the same host is no more.
 void write_row(Database& database, const std::string& token, const ServerSelf& self, const std::string& cells) {
   const std::int64_t now = now_of(database);
-  change(database, "DELETE FROM servers WHERE (server = $1 AND host = $2 AND token <> $3) OR heard_at < $4", self.server,
-         self.host, token, now - kForgottenAfter);
+  change(database, "DELETE FROM servers WHERE (server = $1 AND host = $2 AND token <> $3) OR heard_at < $4",
+         self.server, self.host, token, now - kForgottenAfter);
   change(database,
          "INSERT INTO servers (token, server, host, pid, program, since, heard_at, serves, trains, followed, "
          "cells_json) VALUES ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11) ON CONFLICT (token) DO UPDATE SET "
@@ -56,8 +56,14 @@ void write_row(Database& database, const std::string& token, const ServerSelf& s
 
 ServerInRecord row_of(const Rows& row, std::int64_t now, std::int64_t changes) {
   ServerInRecord one;
-  one.self = {row.text(1),  row.text(2),  row.integer64(3), row.text(4), row.truth(7),
-              row.truth(8), cells_spelled(row.text(10)), row.integer64(9)};
+  one.self = {row.text(1),
+              row.text(2),
+              row.integer64(3),
+              row.text(4),
+              row.truth(7),
+              row.truth(8),
+              cells_spelled(row.text(10)),
+              row.integer64(9)};
   one.since = row.integer64(5);
   one.heard_at = row.integer64(6);
   one.silent_s = std::max<std::int64_t>(now - one.heard_at, 0);
@@ -122,9 +128,8 @@ Status Store::take_leave() {
 
 Result<std::vector<ServerInRecord>> Store::servers(bool with_cells) const {
   if (!is_shared()) return std::vector<ServerInRecord>();
-  return connection_->exclusively([&](Database& database) -> Result<std::vector<ServerInRecord>> {
-    return server_rows(database, with_cells);
-  });
+  return connection_->exclusively(
+      [&](Database& database) -> Result<std::vector<ServerInRecord>> { return server_rows(database, with_cells); });
 }
 
 }  // namespace trammel

@@ -214,7 +214,8 @@ class Store {
   void works_as(const std::string& server);
   /// Tells that this server still works on the job that it claimed.
   [[nodiscard]] Result<ClaimState> renew_claim(std::int64_t job);
-  /// Ends a job that waits, and has the server that works on it end one that runs. Refuses (kConflict) one that is over.
+  /// Ends a job that waits, and has the server that works on it end one that runs. Refuses (kConflict) one that is
+  /// over.
   [[nodiscard]] Result<CancelledJob> cancel_job(std::int64_t job, const JobOutcome& outcome, const ChangeId& by);
   /// A heartbeat: says to the others that this server is there, and what it does. Of a store that several servers
   /// share; else nothing is told. For one thread at a time.
@@ -226,10 +227,10 @@ class Store {
   [[nodiscard]] Result<std::vector<ServerInRecord>> servers(bool with_cells) const;
   /// How many descriptions of cells there ever were: another number, another state of them.
   [[nodiscard]] Result<std::int64_t> descriptions_made() const;
-  /// Compares how this server's files describe cells with the descriptions that the record goes by. A cell that has none
-  /// gets this one. Another one is taken where all servers that are there have it, two at least; or where no other one
-  /// is there and the one that is had was this server's own, as it `starts`. Returns the cells that it may not answer
-  /// for, and why, one sentence each. Needs tell_presence() before.
+  /// Compares how this server's files describe cells with the descriptions that the record goes by. A cell that has
+  /// none gets this one. Another one is taken where all servers that are there have it, two at least; or where no other
+  /// one is there and the one that is had was this server's own, as it `starts`. Returns the cells that it may not
+  /// answer for, and why, one sentence each. Needs tell_presence() before.
   [[nodiscard]] Result<std::map<std::string, std::string>> agree_on_cells(
       const std::map<std::string, CellDescription>& mine, bool starts);
   /// The jobs that wait and that no server works on that is believed to live, nor on another one of their cell.

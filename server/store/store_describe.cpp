@@ -14,7 +14,8 @@ namespace {
 
 /// Runs `work` in one transaction.
 template <typename Work>
-std::invoke_result_t<const Work&, Database&> in_record(const std::string& url, Transaction::For what, const Work& work) {
+std::invoke_result_t<const Work&, Database&> in_record(const std::string& url, Transaction::For what,
+                                                       const Work& work) {
   const std::string place = spoken_place(url);
   if (!is_postgres_url(url))
     return refused("is no URL of PostgreSQL").in(place).next("a file has one server, whose files count");
@@ -53,8 +54,8 @@ Result<std::vector<CellInRecord>> described_cells(const std::string& url) {
       for (const ServerInRecord& server : servers) {
         const auto has = server.self.cells.find(cell);
         if (has == server.self.cells.end()) continue;
-        one.servers.push_back({server.self.server, server.self.host, server.is_gone,
-                               what_differs(known.files, has->second.files)});
+        one.servers.push_back(
+            {server.self.server, server.self.host, server.is_gone, what_differs(known.files, has->second.files)});
       }
     }
     return cells;

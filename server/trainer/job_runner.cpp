@@ -259,7 +259,8 @@ JobRunner::Attempt JobRunner::keep(const StoredJob& job, const Made& made, Compu
 JobRunner::Attempt JobRunner::quarantine(const StoredJob& job, const std::string& why, const ComputeCost& cost,
                                          const StopRequests& stop) {
   const std::string& id = job.batch_ids.front();
-  const Status kept = once_the_disk_lets(job.id, stop, [&] { return store_.set_quarantine(job.cell, id, why, {}, job.id); });
+  const Status kept =
+      once_the_disk_lets(job.id, stop, [&] { return store_.set_quarantine(job.cell, id, why, {}, job.id); });
   if (!kept) return tl::make_unexpected(Failed{kept.error(), verdict_of(kept.error())});
   Failure refusal = refused("batch {} is in quarantine: {}; nothing was learned from it", id, why)
                         .of("batch")

@@ -29,7 +29,7 @@ constexpr std::size_t kMaxSources = 500;            // as in a cell file
 constexpr int kJobsListed = 20;                     // of those done and of those failed, the last ones
 constexpr std::chrono::seconds kLoadingAtStart{1};  // of models, before the service says that it is ready
 constexpr std::chrono::seconds kKeeperTick{1};
-constexpr int kKeeperNiceness = 5;              // answering comes before loading
+constexpr int kKeeperNiceness = 5;  // answering comes before loading
 
 Status check_batch_id(const std::string& id) {
   if (id.empty()) return refused("a batch needs an id").of("batch");

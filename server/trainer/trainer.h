@@ -99,10 +99,10 @@ class Trainer {
                                            std::optional<double> tolerance_mm, const ChangeId& id = {});
   /// Of a job whose diagnosis or check is found; kBusy while it is not.
   [[nodiscard]] Result<StoredDiagnosis> diagnosis(std::int64_t job) const;
-  /// Ends a job that waits or runs, here or on another server of the same store: its outcome is kCancelled, and nothing of it is stored but the findings that a
-  /// diagnosis already had. The batch that came with it stays, to be trained from when somebody asks. Returns once a
-  /// waiting job is stored as ended; a running one ends within a second. Refuses an unknown job (kNotFound) and one
-  /// that is over (kConflict).
+  /// Ends a job that waits or runs, here or on another server of the same store: its outcome is kCancelled, and nothing
+  /// of it is stored but the findings that a diagnosis already had. The batch that came with it stays, to be trained
+  /// from when somebody asks. Returns once a waiting job is stored as ended; a running one ends within a second.
+  /// Refuses an unknown job (kNotFound) and one that is over (kConflict).
   [[nodiscard]] Status cancel(std::int64_t job, const ChangeId& by = {});
   /// Lets trainings take a batch that was kept out because it did not fit the model in force.
   [[nodiscard]] Status release(const std::string& cell, const std::string& batch_id, const ChangeId& id = {});

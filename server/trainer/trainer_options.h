@@ -15,7 +15,7 @@ struct TrainerOptions {
   std::uint64_t seed = 1;
   bool trains = true;    ///< false: jobs wait for another server of the same store
   ServerSelf self = {};  ///< what is told of the process to the other servers of the store
-  KeepRule keep = {};  ///< what of the store is pruned, after each job
+  KeepRule keep = {};    ///< what of the store is pruned, after each job
   ComputeOptions compute = {};
 };
 

@@ -137,14 +137,14 @@ TEST(ServiceText, WhatIsNotInForceComesWithTheNextCommand) {
 TEST(ServiceText, TheServersOfARecordAreThereBehindOrGone) {
   using nlohmann::ordered_json;
   const ordered_json record = {{"kind", "postgresql"}, {"place", "postgresql://db/trammel"}, {"reachable", true}};
-  ordered_json one = {{"server", "one"}, {"host", "h1"}, {"version", "0.1.0"}, {"pid", 7}, {"serves", true},
-                      {"trains", true}, {"gone", false}, {"changes_behind", 0}};
+  ordered_json one = {{"server", "one"}, {"host", "h1"},   {"version", "0.1.0"}, {"pid", 7},
+                      {"serves", true},  {"trains", true}, {"gone", false},      {"changes_behind", 0}};
   one["cells"] = {{{"cell", "cell-7"}, {"version", 3}}, {{"cell", "cell-8"}, {"version", 0}, {"why", "other files"}}};
-  ordered_json two = {{"server", "two"}, {"host", "h2"}, {"version", "0.1.0"}, {"pid", 8}, {"serves", false},
-                      {"trains", true}, {"gone", false}, {"changes_behind", 2}};
+  ordered_json two = {{"server", "two"}, {"host", "h2"},   {"version", "0.1.0"}, {"pid", 8},
+                      {"serves", false}, {"trains", true}, {"gone", false},      {"changes_behind", 2}};
   two["works_on"] = {{{"job", 4}, {"cell", "cell-7"}}};
-  const ordered_json gone = {{"server", "three"}, {"host", "h3"}, {"gone", true}, {"heard_unix_s", 1'700'000'000},
-                             {"silent_s", 60}};
+  const ordered_json gone = {
+      {"server", "three"}, {"host", "h3"}, {"gone", true}, {"heard_unix_s", 1'700'000'000}, {"silent_s", 60}};
   EXPECT_EQ(servers_text({one, two, gone}, record),
             "servers of the record:\n"
             "  one on h1 (0.1.0, process 7): serves 1 cell, trains, up to date\n"

@@ -339,8 +339,8 @@ TEST_F(Fleet, EachServerShowsTheSameFleetAndOneThatIsKilledIsSaidToBeGone) {
   const auto jobs = one->jobs("cell-7");
   ASSERT_TRUE(jobs);
   EXPECT_TRUE(fleet.contains(jobs->front().worker)) << jobs->front().worker;
-  const std::string shown = command({"status", "--service", "--port", std::to_string(first_.port()), "--domain",
-                                     std::to_string(first_.domain())});
+  const std::string shown = command(
+      {"status", "--service", "--port", std::to_string(first_.port()), "--domain", std::to_string(first_.domain())});
   for (const test::Daemon* daemon : {&first_, &second_, &third_}) {
     EXPECT_NE(shown.find(daemon->name() + " on "), std::string::npos) << shown;
     EXPECT_NE(page(*daemon, "/fleet").body.find("All 3 servers are there."), std::string::npos) << "also the last one";
@@ -349,8 +349,9 @@ TEST_F(Fleet, EachServerShowsTheSameFleetAndOneThatIsKilledIsSaidToBeGone) {
   third_.kill();
   wait_until([&] { return is_gone(*one, third_); }, "it is said to be gone");
   wait_until([&] { return is_gone(*other, third_); }, "also by the other one");
-  wait_until([&] { return page(second_, "/fleet").body.find("1 of 3 servers gone: " + third_.name()) != std::string::npos; },
-             "the page");
+  wait_until(
+      [&] { return page(second_, "/fleet").body.find("1 of 3 servers gone: " + third_.name()) != std::string::npos; },
+      "the page");
   wait_until([&] { return page(first_, "/readyz").body.find(third_.name() + " on ") != std::string::npos; }, "/readyz");
   const std::string metrics = page(first_, "/metrics").body;
   EXPECT_TRUE(std::regex_search(metrics, std::regex("trammel_server_there\\{[^}]*" + third_.name() + "[^}]*\\} 0")))

@@ -63,8 +63,8 @@ TEST_F(ServersPage, ACellWithOtherFilesIsDarkAndNamesBothServers) {
   EXPECT_EQ(ready.told["dark"][0]["state"], "described_otherwise");
   EXPECT_TRUE(has(servers_page(server.watched()).body, cells[0].why.substr(0, 40)));
   test::SmallBatch measured;
-  const auto refused = server.trainer().submit(
-      "cell-7", "b1", test::small_batch_csv(*test::small_cell("cell-7"), measured), "b1");
+  const auto refused =
+      server.trainer().submit("cell-7", "b1", test::small_batch_csv(*test::small_cell("cell-7"), measured), "b1");
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kConflict);
 }

@@ -161,8 +161,7 @@ TEST(ShippedWatching, PromtoolTakesTheRulesAndTheConfigurationAndTheRulesFireWhe
   for (const std::vector<std::string>& command :
        {std::vector<std::string>{"promtool", "check", "rules", kFolder + "alerts.yml"},
         std::vector<std::string>{"promtool", "check", "config", kFolder + "prometheus.yml"},
-        std::vector<std::string>{"promtool", "test", "rules",
-                                 TRAMMEL_SOURCE_DIR "/tests/http/alerts_of_the_store.yml"},
+        std::vector<std::string>{"promtool", "test", "rules", TRAMMEL_SOURCE_DIR "/tests/http/alerts_of_the_store.yml"},
         std::vector<std::string>{"promtool", "test", "rules",
                                  TRAMMEL_SOURCE_DIR "/tests/http/alerts_of_the_record.yml"}}) {
     const auto done = test::run({"/usr/bin/env", command[0], command[1], command[2], command[3]});

@@ -26,15 +26,17 @@ TEST(CellDescription, WhatIsSpelledOtherwiseOrForPeopleIsTheSame) {
   EXPECT_EQ(description(replaced(text, "0.02", "2e-2")), one);
   EXPECT_EQ(description(replaced(text, "robot.yaml", "../robots/robot.yaml")), one);
   EXPECT_EQ(description(text + "operator: Anna\nserial_number: 6640-1\n"), one);
-  EXPECT_EQ(description(replaced(text, "xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, 0]", "q_wxyz: [1, 0, 0, 0], xyz_mm: [0, 0, 0]")),
-            one);
+  EXPECT_EQ(
+      description(replaced(text, "xyz_mm: [0, 0, 0], q_wxyz: [1, 0, 0, 0]", "q_wxyz: [1, 0, 0, 0], xyz_mm: [0, 0, 0]")),
+      one);
   EXPECT_EQ(what_differs(one, one), "");
 }
 
 TEST(CellDescription, WhatDecidesNumbersIsNotAndItIsSaidInWhichFile) {
   const std::string text = test::small_cell_yaml("cell-7"), robot = test::small_robot_yaml();
   const CellDescription one = description(text);
-  const std::string shifted = replaced(text, "58.553", "58.554"), other_robot = replaced(robot, "a_mm: 320", "a_mm: 321");
+  const std::string shifted = replaced(text, "58.553", "58.554"),
+                    other_robot = replaced(robot, "a_mm: 320", "a_mm: 321");
   EXPECT_EQ(what_differs(one, description(shifted)), "cell file");
   EXPECT_EQ(what_differs(one, description(text, other_robot)), "robot file");
   EXPECT_EQ(what_differs(one, description(shifted, other_robot)), "cell file and robot file");

@@ -180,9 +180,10 @@ TEST_F(Claims, AClaimIsKeptWhileAllOtherConnectionsOfItsServerWaitForLocks) {
         while (!over) static_cast<void>(one_->set_quarantine("cell-7", "b1", std::to_string(i)));
       });
     const auto all_wait = [&] {
-      return test::Postgres::of_program().sql(url_,
-                                              "SELECT count(*) FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND "
-                                              "datname = current_database()") == "4\n";
+      return test::Postgres::of_program().sql(
+                 url_,
+                 "SELECT count(*) FROM pg_stat_activity WHERE wait_event_type = 'Lock' AND "
+                 "datname = current_database()") == "4\n";
     };
     const auto until = std::chrono::steady_clock::now() + std::chrono::minutes(2);
     while (!all_wait()) ASSERT_LT(std::chrono::steady_clock::now(), until);

@@ -112,8 +112,8 @@ TEST_F(Servers, ACellWithOtherFilesIsNotAgreedOnAndBothServersAreNamedWithWhatDi
     const auto disputes = arrive(*other_, files);
     ASSERT_TRUE(disputes.contains("cell-7"));
     const std::string why = disputes.at("cell-7");
-    for (const std::string& word : {std::string("cell-7"), std::string("other has "), std::string(what),
-                                    std::string("than one (on host-a)")})
+    for (const std::string& word :
+         {std::string("cell-7"), std::string("other has "), std::string(what), std::string("than one (on host-a)")})
       EXPECT_NE(why.find(word), std::string::npos) << why;
   }
   EXPECT_EQ(arrive(*one_, kFirst), Disputes()) << "the one that agrees with the record serves it";

@@ -89,10 +89,8 @@ nlohmann::ordered_json json_of(const std::vector<CellInRecord>& cells) {
   for (const CellInRecord& one : cells) {
     nlohmann::ordered_json servers = nlohmann::ordered_json::array();
     for (const CellOfServer& server : one.servers)
-      servers.push_back({{"server", server.server},
-                         {"host", server.host},
-                         {"gone", server.is_gone},
-                         {"differs", server.differs}});
+      servers.push_back(
+          {{"server", server.server}, {"host", server.host}, {"gone", server.is_gone}, {"differs", server.differs}});
     list.push_back({{"cell", one.cell},
                     {"server", one.server},
                     {"since_unix_s", one.since},
@@ -160,9 +158,9 @@ void add_store_command(CLI::App& app, Action& chosen) {
   CLI::App* reopened = add(*store, chosen, "reopen", "Have a store served again that was moved, since TO is given up",
                            reopen, arguments);
   reopened->add_option("STORE", arguments->place, "A file, or a URL of PostgreSQL")->required();
-  CLI::App* described = add(*store, chosen, "describe",
-                            "Show whose files each cell goes by among the servers of one record, or choose", describe,
-                            arguments);
+  CLI::App* described =
+      add(*store, chosen, "describe", "Show whose files each cell goes by among the servers of one record, or choose",
+          describe, arguments);
   described->add_option("URL", arguments->place, "postgresql://ROLE@HOST/DATABASE, as a server of it has it")
       ->required();
   described->add_option("--cell", arguments->cell, "Cell whose description is chosen");

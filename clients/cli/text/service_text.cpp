@@ -213,13 +213,14 @@ std::string record_text(const ordered_json& record) {
   if (word_in(record, "kind") != "postgresql") return "";
   const std::string place = word_in(record, "place");
   if (!says_yes(record, "reachable"))
-    return fmt::format("record: {} is away since {} UTC; what is in force is served, and every change is refused\n", place,
-                       date_text(number_in(record, "away_since_unix_s")));
+    return fmt::format("record: {} is away since {} UTC; what is in force is served, and every change is refused\n",
+                       place, date_text(number_in(record, "away_since_unix_s")));
   const bool is_unsafe = record.contains("trail_is_safe") && record["trail_is_safe"] == false;
   return fmt::format("record: {}; an acknowledged change survives {}\n", place, word_in(record, "survives")) +
-         (is_unsafe ? "record: the servers' role could change the audit trail; trammel store init --grant lets in one that "
-                      "cannot\n"
-                    : "");
+         (is_unsafe
+              ? "record: the servers' role could change the audit trail; trammel store init --grant lets in one that "
+                "cannot\n"
+              : "");
 }
 
 std::string servers_text(const ordered_json& servers, const ordered_json& record) {
