@@ -338,7 +338,7 @@ TEST(Krl, ALoadThatNobodyToldIsTheControllersDefault) {
     const test::Corrected made = corrected_by_shift(
         Dialect::kKrl, {{"p.src", program("$LOAD=LOAD_DATA[1]\nLIN " + kPoint + "\n")}, {"$config.dat", config}});
     EXPECT_TRUE(row_of(made.program, kPoint).corrected()) << why(made, kPoint) << made.refusal;
-    ASSERT_EQ(made.program.notes.size(), 1u) << load;
+    ASSERT_EQ(made.program.notes.size(), 2u) << load << ": the other one is of the posture";
     EXPECT_NE(made.program.notes[0].find("a load of -1 kg ($config.dat line 5): the controller takes its default load"),
               std::string::npos)
         << made.program.notes[0];

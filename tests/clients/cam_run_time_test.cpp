@@ -175,7 +175,7 @@ TEST(RunTimeFanuc, AMacroMaySelectAnotherFrame) {
     return fanuc(
         {{"p.ls", ls("P", select + "   2:  " + line + " ;\n   3:L P[1] 100mm/sec FINE ;\n", point(1, "F", "F"))}});
   };
-  EXPECT_TRUE(has(why(made("GRIPPER OPEN"), "P[1]"), "GRIPPER OPEN (line 7) is not known here"))
+  EXPECT_TRUE(has(why(made("GRIPPER OPEN"), "P[1]"), "GRIPPER OPEN (line 6) is not known here"))
       << why(made("GRIPPER OPEN"), "P[1]");
   for (const char* line : {"DO[1:clamp]=ON", "R[1]=R[1]+1", "WAIT   1.00(sec)", "OVERRIDE=50%", "$WAITTMOUT=200",
                            "! GRIPPER OPEN", "MESSAGE[open it]", "Weave Sine[1]"})
