@@ -168,6 +168,7 @@ class Gate final : public rtps::ChainingTransport {
 
   void receive(rtps::TransportReceiverInterface* next, const unsigned char* buffer, std::uint32_t size,
                const Locator_t& here, const Locator_t& there) override {
+    if (hearing_) hearing_->wait();
     if (guard_ && is_own(Bytes(buffer, size)) && !own_messages_.has(Bytes(buffer, size))) {
       dropped_->add(Dropped::kSource);
       return;
@@ -241,6 +242,7 @@ class Gate final : public rtps::ChainingTransport {
   std::unique_ptr<GateDescriptor> configuration_;
   const std::optional<std::uint32_t> domain_;
   const std::shared_ptr<HeardOfItself> heard_;
+  const std::shared_ptr<Hearing> hearing_;
   const std::shared_ptr<DropCounts> dropped_;  // null as guard_ is
   const std::unique_ptr<Guard> guard_;
   OwnMessages own_messages_;
@@ -280,6 +282,7 @@ Gate::Gate(const GateDescriptor& descriptor)
       configuration_(std::make_unique<GateDescriptor>(descriptor)),
       domain_(descriptor.all_domains ? std::nullopt : std::optional(descriptor.options.domain)),
       heard_(descriptor.options.heard),
+      hearing_(descriptor.options.hearing),
       dropped_(descriptor.options.dropped),
       guard_(descriptor.options.dropped
                  ? std::make_unique<Guard>(

@@ -4,6 +4,7 @@
 #include <fastdds/rtps/transport/TransportDescriptorInterface.h>
 
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "idl/guard/dropped.h"
+#include "server/base/mutex.h"
 
 /// Keeps DDS domains apart. Discovery here uses a fixed port in every domain, and Fast DDS 2.9 does not check the
 /// domain of an announcement. So this gate, a transport below the library, reads the domain in each announcement and
@@ -41,6 +43,32 @@ struct HeardOfItself {
   std::atomic<std::uint32_t> first_lost_of{0};
 };
 
+/// Whether the library hears already. A participant announces itself while it is being made, and the library drops what
+/// is answered before that is done: of the handshake of certificates the next attempt comes a second later.
+/// Thread-safe.
+class Hearing {
+ public:
+  void begins() {
+    {
+      const MutexLock lock(mutex_);
+      begun_ = true;
+    }
+    changed_.notify_all();
+  }
+  /// Until it does, kLongest at most.
+  void wait() {
+    if (begun_) return;
+    MutexLock lock(mutex_);
+    changed_.wait_until(lock, std::chrono::steady_clock::now() + kLongest, [this] { return begun_.load(); });
+  }
+
+ private:
+  static constexpr std::chrono::seconds kLongest{2};
+  std::atomic<bool> begun_{false};
+  Mutex mutex_;
+  Condition changed_;
+};
+
 struct GateOptions {
   std::uint32_t domain = 0;
   std::shared_ptr<HeardOfItself> heard = {};  ///< may be null
@@ -48,6 +76,7 @@ struct GateOptions {
   std::uint32_t largest_sent = UINT32_MAX;    ///< bytes of a datagram; others may send what `below` takes
   bool secured = false;                       ///< participants prove who they are
   bool serves = false;                        ///< others are clients: they have few endpoints
+  std::shared_ptr<Hearing> hearing = {};      ///< what comes waits for it; null: it does not
   /// Where others are looked for: they are sent what they are sent, whoever else names them.
   std::vector<eprosima::fastrtps::rtps::Locator_t> hosts = {};
 };

@@ -86,6 +86,7 @@ Result<ParticipantPtr> make_participant(const ParticipantOptions& options, dds::
   GateOptions gate{options.domain, options.heard_of_itself, options.dropped};
   gate.secured = options.security.has_value();
   gate.serves = options.heard_of_itself != nullptr;
+  gate.hearing = std::make_shared<Hearing>();
   for (const std::uint16_t port : options.peer_ports) gate.hosts.push_back(locator(options.address, port));
   for (const HostPort& peer : options.peers) gate.hosts.push_back(locator(peer.address, peer.port));
   if (options.heard_of_itself) gate.hosts.push_back(locator(options.address, options.listen_port));
@@ -100,6 +101,7 @@ Result<ParticipantPtr> make_participant(const ParticipantOptions& options, dds::
 
   dds::DomainParticipant* participant = dds::DomainParticipantFactory::get_instance()->create_participant(
       options.domain, qos, discovery, dds::StatusMask::none());
+  gate.hearing->begins();
   if (participant == nullptr) {
     if (options.security) {
       return refused("DDS-Security refuses what is in it for domain {}: see the errors of the library", options.domain)

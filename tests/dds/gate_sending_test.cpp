@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <chrono>
 #include <fastdds/rtps/common/LocatorList.hpp>
+#include <future>
 #include <memory>
 #include <vector>
 
@@ -152,6 +153,27 @@ TEST_F(GuardedGate, WhatComesInOurOwnNameIsHeardOnlyWhereWeHaveSentIt) {
   EXPECT_EQ(heard(Packet(kSelf).to(kResident).heartbeat(kTheirReader, kPublications, 1, 900, 9).bytes()), 0)
       << "it was for somebody else";
   EXPECT_EQ(heard(Packet(kResident).to(kSelf).heartbeat(kTheirReader, kPublications, 1, 900, 9).bytes()), 1);
+}
+
+TEST(Hearing, WhatComesBeforeTheLibraryHearsWaits) {
+  const auto hearing = std::make_shared<Hearing>();
+  GateOptions options;
+  options.hearing = hearing;
+  const std::unique_ptr<rtps::ChainingTransport> gate(dynamic_cast<rtps::ChainingTransport*>(
+      with_domain_gate(std::make_shared<rtps::UDPv4TransportDescriptor>(), options)->create_transport()));
+  HeardMessages heard;
+  const PacketBytes message = announcement(kResident, kOfResident);
+  auto received = std::async(std::launch::async, [&] {
+    gate->receive(&heard, message.data(), static_cast<std::uint32_t>(message.size()), locator("127.0.0.1", 2000),
+                  locator("127.0.0.1", 3000));
+  });
+  EXPECT_EQ(received.wait_for(milliseconds(100)), std::future_status::timeout);
+  hearing->begins();
+  received.get();
+  EXPECT_EQ(heard.messages, 1);
+  gate->receive(&heard, message.data(), static_cast<std::uint32_t>(message.size()), locator("127.0.0.1", 2000),
+                locator("127.0.0.1", 3000));
+  EXPECT_EQ(heard.messages, 2);
 }
 
 TEST(Askers, WhoAsksForEndpointsIsKnownByTheNumbersThatItLacks) {
