@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "server/base/shown_value.h"
@@ -47,15 +46,9 @@ std::vector<std::string> in_words(const ErrorBudget& budget, int most) {
   std::vector<std::string> text = {fmt::format(
       "the drawing is off by {:.3f} mm rms at {} poses; touching base and tool frames would leave {:.3f} mm",
       to_mm(budget.as_it_stands.error_rms), budget.poses, to_mm(budget.beyond_frames.error_rms))};
-  // What stands out leads.
-  std::vector<const BudgetLine*> lines;
-  for (const BudgetLine& line : budget.as_it_stands.lines) lines.push_back(&line);
-  std::stable_sort(lines.begin(), lines.end(), [](const BudgetLine* one, const BudgetLine* other) {
-    return !one->action.empty() && other->action.empty();
-  });
-  for (const BudgetLine* line : lines) {
-    const bool shown = most-- > 0 || std::abs(line->share) > kAlwaysShown || line->kind == LineKind::kUntold;
-    if (shown) text.push_back(sentence(*line));
+  for (const BudgetLine& line : budget.as_it_stands.lines) {
+    const bool shown = most-- > 0 || std::abs(line.share) > kAlwaysShown || line.kind == LineKind::kUntold;
+    if (shown) text.push_back(sentence(line));
   }
   return text;
 }

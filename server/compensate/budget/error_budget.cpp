@@ -165,8 +165,10 @@ BudgetView view_of(const ViewAsked& asked, bool frames, const Seen& seen) {
   if (asked.has_bias)
     view.lines.push_back(
         sized(named(LineKind::kLearned, "what is learned beyond the physics"), seen(asked.effects.learned), total));
-  std::stable_sort(view.lines.begin(), view.lines.end(),
-                   [](const BudgetLine& one, const BudgetLine& other) { return one.share > other.share; });
+  // What stands out leads.
+  std::stable_sort(view.lines.begin(), view.lines.end(), [](const BudgetLine& one, const BudgetLine& other) {
+    return one.action.empty() == other.action.empty() ? one.share > other.share : other.action.empty();
+  });
   // What frames do is out of every vector, so that their small remainder counts with what acts together.
   Eigen::Matrix3Xd together = asked.effects.together;
   for (std::size_t k = 0; k < asked.items.size(); ++k)
