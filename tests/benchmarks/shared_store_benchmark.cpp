@@ -54,7 +54,7 @@ void fill(const test::Postgres& database, const std::string& url, int batches) {
   const std::string checks_off = "SET session_replication_role = replica; ";
   database.sql(url, fmt::format("INSERT INTO cells SELECT 'cell-' || c, {} FROM {}", kVersionsOfEach, cells));
   database.sql(url,
-               fmt::format("{}INSERT INTO models SELECT 'cell-' || c, v, 'id', md5({}::text), 'none', 'b', 0, 300, 0, "
+               fmt::format("{}INSERT INTO models SELECT 'cell-' || c, v, 'id', md5(({})::text), 'none', 'b', 0, 300, 0, "
                            "'x' FROM {}, generate_series(1, {}) AS v",
                            checks_off, number, cells, kVersionsOfEach));
   database.sql(url,
