@@ -53,10 +53,10 @@ void fill(const test::Postgres& database, const std::string& url, int batches) {
   const std::string number = fmt::format("(c - 1) * {} + v", kVersionsOfEach);
   const std::string checks_off = "SET session_replication_role = replica; ";
   database.sql(url, fmt::format("INSERT INTO cells SELECT 'cell-' || c, {} FROM {}", kVersionsOfEach, cells));
-  database.sql(url,
-               fmt::format("{}INSERT INTO models SELECT 'cell-' || c, v, 'id', md5(({})::text), 'none', 'b', 0, 300, 0, "
-                           "'x' FROM {}, generate_series(1, {}) AS v",
-                           checks_off, number, cells, kVersionsOfEach));
+  database.sql(
+      url, fmt::format("{}INSERT INTO models SELECT 'cell-' || c, v, 'id', md5(({})::text), 'none', 'b', 0, 300, 0, "
+                       "'x' FROM {}, generate_series(1, {}) AS v",
+                       checks_off, number, cells, kVersionsOfEach));
   database.sql(url,
                fmt::format("{}INSERT INTO activations (number, cell, version, back, activated_at) SELECT {}, "
                            "'cell-' || c, v, CASE WHEN v > 1 THEN {} - 1 END, 0 FROM {}, generate_series(1, {}) AS v",
