@@ -182,6 +182,26 @@ TEST_F(CorrectProgram, AFolderRunLeavesTheControllersOwnFilesAsTheyAre) {
   EXPECT_NE(text("asked/$config.dat"), text("in" + config)) << "asked for by its name";
 }
 
+TEST_F(CorrectProgram, SystemModulesOfAFolderStayWhereverTheyLie) {
+  fs::create_directories(file("in"));
+  fs::copy(kPrograms + "drill.mod", file("in/User.sys"));
+  EXPECT_EQ(correct({"--model", model(), file("in"), "-o", file("out")}), kNotAll);
+  EXPECT_EQ(text("out/User.sys"), text("in/User.sys"));
+  EXPECT_EQ(correct({"--model", model(), file("in/User.sys"), "-o", file("asked.sys")}), 0);
+  EXPECT_NE(text("asked.sys"), text("in/User.sys"));
+}
+
+TEST_F(CorrectProgram, PulsesAreToldInSixNumbersAndOfYaskawaJobsAlone) {
+  const auto with = [&](const char* program, const char* pulses) {
+    return correct({"--model", model(), kPrograms + program, "-o", file("out.txt"), "--frames",
+                    kPrograms + "frames.csv", "--pulses-per-deg", pulses});
+  };
+  EXPECT_EQ(with("drill.jbi", "1000,1000,1000,1000,1000,1000"), 0);
+  EXPECT_EQ(with("drill.jbi", "1000,1000,1000"), kWrongUsage);
+  EXPECT_EQ(with("drill.jbi", "1000,1000,0,1000,1000,1000"), kWrongUsage);
+  EXPECT_EQ(with("drill.mod", "1000,1000,1000,1000,1000,1000"), kWrongUsage);
+}
+
 TEST_F(CorrectProgram, ADatFileOfAFolderIsKrlOnlyWhereItLooksLikeIt) {
   for (const auto& [program, other] : {std::pair("drill.ls", "orderfil.dat"), std::pair("drill.jbi", "HOME2.DAT"),
                                        std::pair("drill.mod", "log.dat")}) {

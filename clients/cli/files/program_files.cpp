@@ -71,8 +71,10 @@ std::vector<Found> programs_in(const std::string& folder, const std::optional<ca
 /// System, Mada and Steu, ABB's system modules and parameters.
 bool is_of_the_controller(const std::string& name) {
   static const std::set<std::string> kFolders = {"system", "mada", "steu", "sysmod", "syspar"};
+  static const std::set<std::string> kFiles = {"base.sys", "user.sys"};
   const fs::path path(name);
-  if (path.filename().string().starts_with('$')) return true;
+  const std::string file = path.filename().string();
+  if (file.starts_with('$') || kFiles.contains(lower(file))) return true;
   return std::any_of(path.begin(), path.end(),
                      [&](const fs::path& part) { return kFolders.contains(lower(part.string())); });
 }
