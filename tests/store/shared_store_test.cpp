@@ -156,23 +156,25 @@ TEST_F(SharedStore, ASchemaOfTheFutureIsRefusedUnlessItSaysThatThisProgramWorksO
   ASSERT_FALSE(newer);
   EXPECT_EQ(newer.error().field, "schema");
   EXPECT_EQ(newer.error().value, 7);
-  say("UPDATE trammel_schema SET version = 7, works_from = 2");
+  say("UPDATE trammel_schema SET version = 7, works_from = 3");
   EXPECT_TRUE(Store::open(url_)) << "a rolling update";
 }
 
 TEST_F(SharedStore, ASchemaOfBeforeIsBroughtUpToDateByInitAndByNothingElse) {
   say("CREATE TABLE replica (epoch bigint); CREATE TABLE learned_elsewhere (cell text); "
-      "CREATE TABLE versions_elsewhere (cell text); UPDATE trammel_schema SET version = 1, works_from = 1");
+      "CREATE TABLE versions_elsewhere (cell text); DROP TABLE servers, cell_descriptions; "
+      "ALTER TABLE audit DROP COLUMN server; UPDATE trammel_schema SET version = 1, works_from = 1");
   const auto older = Store::open(url_);
   ASSERT_FALSE(older);
   EXPECT_NE(sentence(older.error()).find("trammel store init"), std::string::npos) << sentence(older.error());
-  ASSERT_TRUE(init_store(url_));
+  const Status made = init_store(url_);
+  ASSERT_TRUE(made) << sentence(made.error());
   EXPECT_TRUE(Store::open(url_));
   EXPECT_EQ(postgres_.sql(url_,
                           "SELECT count(*) FROM pg_tables WHERE tablename IN ('replica', 'learned_elsewhere', "
                           "'versions_elsewhere')"),
             "0\n");
-  EXPECT_EQ(postgres_.sql(url_, "SELECT version || ' ' || works_from FROM trammel_schema"), "2 2\n");
+  EXPECT_EQ(postgres_.sql(url_, "SELECT version >= 3 AND works_from >= 2 FROM trammel_schema"), "t\n");
 }
 
 TEST_F(SharedStore, ARoleThatMayOnlyUseItCannotChangeTheAuditTrail) {
