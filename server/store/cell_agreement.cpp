@@ -38,7 +38,7 @@ std::string why_not(const std::string& cell, const std::string& me, const Descri
                                 ? fmt::format("than {} (on {})", (*holder)->self.server, (*holder)->self.host)
                                 : fmt::format("than {} had", known.server == me ? "it" : known.server);
   return fmt::format(
-      "cell {}: {} has another {} {}, by which the record goes: it is not served here until they agree "
+      "cell {0}: {1} has another {2} {3}, by which the record goes: {1} does not serve it until they agree "
       "(trammel store describe says whose counts)",
       cell, me, what_differs(known.files, mine), whose);
 }
