@@ -36,9 +36,8 @@ std::string served_by(const ServerInRecord& one) {
 }
 
 bool has_other_files(const ServerInRecord& one) {
-  return std::any_of(one.self.cells.begin(), one.self.cells.end(), [](const auto& named) {
-    return named.second.version == 0 && !named.second.why_not.empty();
-  });
+  return std::any_of(one.self.cells.begin(), one.self.cells.end(),
+                     [](const auto& named) { return named.second.version == 0 && !named.second.why_not.empty(); });
 }
 
 std::string work_of(const ServerInRecord& one) {

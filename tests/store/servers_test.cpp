@@ -42,7 +42,8 @@ class Servers : public testing::Test {
   }
   std::string say(const std::string& sql) const { return test::Postgres::of_program().sql(url_, sql); }
   void was_heard(const std::string& server, int seconds_ago) const {
-    say(fmt::format("UPDATE servers SET heard_at = CAST(EXTRACT(EPOCH FROM clock_timestamp()) AS bigint) - {} "
+    say(
+        fmt::format("UPDATE servers SET heard_at = CAST(EXTRACT(EPOCH FROM clock_timestamp()) AS bigint) - {} "
                     "WHERE server = '{}'",
                     seconds_ago, server));
   }
