@@ -40,6 +40,14 @@ Effects effects_of(const LeftAt& left, const Datum& datum, const std::vector<Bud
   return effects;
 }
 
+Eigen::Matrix3Xd effect_of_all(const PhysicalModel& model, const std::vector<const BudgetItem*>& items,
+                               const MeasurementBatch& positions) {
+  PhysicalModel rest = model;
+  for (const BudgetItem* item : items)
+    for (const Eigen::Index place : item->places) rest.values(place) = 0;
+  return positions_by(model, positions) - positions_by(rest, positions);
+}
+
 BeyondFrames::BeyondFrames(const PhysicalModel& model, const MeasurementBatch& positions) {
   const auto n = std::ssize(positions.measurements);
   std::map<std::string, Eigen::Index> tools;  // first column of each

@@ -23,6 +23,10 @@ struct LeftAt {
 [[nodiscard]] Effects effects_of(const LeftAt& left, const Datum& datum, const std::vector<BudgetItem>& items,
                                  const MeasurementBatch& positions);
 
+/// What `items` do together: the model minus the model in which all of them are on their drawing.
+[[nodiscard]] Eigen::Matrix3Xd effect_of_all(const PhysicalModel& model, const std::vector<const BudgetItem*>& items,
+                                             const MeasurementBatch& positions);
+
 /// Takes out of 3 x N vectors at poses what a small motion of the base and of each tool could do.
 class BeyondFrames {
  public:

@@ -212,19 +212,20 @@ bool is_of_step(const BudgetLine& line, std::string_view step) {
   return false;
 }
 
-std::vector<PutRight> put_right(const std::vector<BudgetItem>& items, const Effects& effects,
+std::vector<PutRight> put_right(const PhysicalModel& model, const std::vector<BudgetItem>& items,
+                                const Effects& effects, const MeasurementBatch& positions,
                                 const BeyondFrames& beyond_frames) {
   const auto rms = [](const Eigen::Matrix3Xd& vectors) { return std::sqrt(mean_square(vectors)); };
   std::vector<PutRight> steps = {{"nothing", "as it stands", rms(effects.total)},
                                  {"frames", "base and tool frames touched", rms(beyond_frames(effects.total))}};
-  Eigen::Matrix3Xd left = effects.total;
+  std::vector<const BudgetItem*> right;
   for (const auto& [step, name] :
        {std::pair("zeros", "zeros of the joints set in the controller"),
         std::pair("lengths", "lengths and angles of the links, where a controller takes them"),
         std::pair("load", "load data, where a controller takes the gearboxes into account")}) {
-    for (std::size_t k = 0; k < items.size(); ++k)
-      if (is_of_step(items[k].line, step)) left -= effects.lines[k];
-    steps.push_back({step, name, rms(beyond_frames(left))});
+    for (const BudgetItem& item : items)
+      if (is_of_step(item.line, step)) right.push_back(&item);
+    steps.push_back({step, name, rms(beyond_frames(effects.total - effect_of_all(model, right, positions)))});
   }
   steps.push_back({"correction", "targets corrected by this model", rms(effects.rest)});
   return steps;
@@ -248,7 +249,7 @@ ErrorBudget budget_of(const Identified& found, const LeftAt& left, const Measure
   budget.as_it_stands = view_of(asked, true, [](const Eigen::Matrix3Xd& all) { return all; });
   const BeyondFrames beyond_frames(datum.model, positions);
   budget.beyond_frames = view_of(asked, false, beyond_frames);
-  budget.put_right = put_right(items, effects, beyond_frames);
+  budget.put_right = put_right(datum.model, items, effects, positions, beyond_frames);
   return budget;
 }
 
