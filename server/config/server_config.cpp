@@ -218,8 +218,10 @@ std::string store_of(const YamlMap& map, const std::filesystem::path& folder) {
 }
 
 void read_server_map(const YamlMap& map, const std::filesystem::path& folder, ServerFile& file) {
-  map.only({"version", "server", "cells", "store", "cache", "models_in_memory_mb", "serves", "trains", "replica",
-            "record", "dds", "trainer", "log", "http"});
+  if (map.has("replica"))
+    map.refuse("replica", "no server follows another one; give all of them one `store: postgresql://...` instead");
+  map.only({"version", "server", "cells", "store", "cache", "models_in_memory_mb", "serves", "trains", "record", "dds",
+            "trainer", "log", "http"});
   map.attempt([&] {
     if (map.integer("version", 0) != 1)
       map.refuse("version", refused("expected 1").beyond(map.integer("version", 0), 1));
@@ -242,10 +244,6 @@ void read_server_map(const YamlMap& map, const std::filesystem::path& folder, Se
   });
   map.attempt([&] {
     if (map.has("dds")) read_dds(map.map("dds"), folder, config.dds);
-  });
-  map.attempt([&] {
-    if (map.has("replica"))
-      map.refuse("replica", "no server follows another one; give all of them one `store: postgresql://...` instead");
   });
   map.attempt([&] {
     if (!map.is_null("record")) read_record(map.map("record"), folder, config.dds.record);
