@@ -10,7 +10,7 @@
 namespace trammel {
 namespace {
 
-const std::vector<std::string> kSources = {"base", "geometry"};
+const std::vector<std::string> kSources = {"base", "geometry", "compliance"};
 
 CalibrationResult identified(const MeasurementBatch& batch) {
   return test::demand(calibrate(test::cell_of_three_reflectors(), kSources, batch, {}));
