@@ -373,7 +373,7 @@ TEST(RunTimeInform, WhatASensorOrASoftAxisMovesIsLeftUntilItEnds) {
     const test::Corrected made =
         jbi(job(positions, fmt::format("{}\nMOVL C00000 V=10.0\n{}\nMOVL C00001 V=10.0\n", begins, ends)));
     EXPECT_TRUE(has(why(made, "C00000"), "a sensor or a soft axis moves it: ")) << why(made, "C00000");
-    EXPECT_TRUE(has(why(made, "C00000"), "(line ")) << why(made, "C00000");
+    EXPECT_TRUE(has(why(made, "C00000"), "(j.jbi line ")) << why(made, "C00000");
     EXPECT_TRUE(is_corrected(made, "C00001")) << why(made, "C00001");
   }
 }

@@ -32,8 +32,8 @@ struct Statement {
 
 /// What moves the robot beside where motions say.
 struct Displaced {
-  int shifted_at = 0;  ///< the line of a SFTON that holds; 0: none does
-  std::string sensed;  ///< what a sensor or a soft axis does, as `COMARCON (line 7)`; empty: nothing
+  std::string shifted;  ///< where a SFTON stands that holds; empty: none does
+  std::string sensed;   ///< what a sensor or a soft axis does, as `COMARCON (drill.jbi line 7)`; empty: nothing
   bool operator==(const Displaced&) const = default;
 };
 
@@ -128,10 +128,11 @@ class Job {
                                                               {"PMTON", true},    {"PMTOF", false}};
     const std::vector<Piece> pieces = pieces_at(statement);
     if (pieces.empty()) return;
-    if (pieces[0].is("SFTON")) displaced.shifted_at = statement.line;
-    if (pieces[0].is("SFTOF")) displaced.shifted_at = 0;
+    const std::string place = fmt::format("{} line {}", program_.files[index_].name, statement.line);
+    if (pieces[0].is("SFTON")) displaced.shifted = place;
+    if (pieces[0].is("SFTOF")) displaced.shifted.clear();
     if (const auto sensor = kSensors.find(pieces[0].text); sensor != kSensors.end())
-      displaced.sensed = sensor->second ? fmt::format("{} (line {})", sensor->first, statement.line) : "";
+      displaced.sensed = sensor->second ? fmt::format("{} ({})", sensor->first, place) : "";
   }
 
   void list_unused() {
@@ -309,7 +310,7 @@ class Job {
     if (group_.starts_with("RB") && group_.substr(0, group_.find(',')) != "RB1")
       return leave(fmt::format("the job moves {}, another robot", shown(group_.substr(0, group_.find(',')))));
     if (word == "IMOV") return leave("it is relative to where the robot is");
-    if (displaced.shifted_at != 0) return leave(fmt::format("SFTON displaces it (line {})", displaced.shifted_at));
+    if (!displaced.shifted.empty()) return leave(fmt::format("SFTON displaces it ({})", displaced.shifted));
     if (!displaced.sensed.empty()) return leave(fmt::format("a sensor or a soft axis moves it: {}", displaced.sensed));
     const auto position = positions_.find(name);
     if (position == positions_.end()) return leave("it is a variable, which any job may set");
@@ -413,7 +414,7 @@ void read_motions(std::vector<Job>& jobs) {
         if (places[s].statement != nullptr) jobs[places[s].job].shift(*places[s].statement, displaced);
       },
       [](Displaced& one, const Displaced& other, const std::string&) {
-        one.shifted_at = std::max(one.shifted_at, other.shifted_at);
+        if (one.shifted.empty()) one.shifted = other.shifted;
         if (one.sensed.empty()) one.sensed = other.sensed;
       });
   for (std::size_t s = 0; s < steps.size(); ++s) {
