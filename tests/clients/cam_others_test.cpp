@@ -64,7 +64,8 @@ TEST(Inform, WhatAJumpBackOrAJobThatIsCalledDisplacesIsLeft) {
            "WHILE IN#(1)=ON\r\nMOVL C00000 V=100.0\r\nSFTON P001 UF#(1)\r\nENDWHILE\r\n",
            "*A\r\nMOVL C00000 V=100.0\r\nJUMP *B IF IN#(1)=ON\r\nSFTOF\r\n*B\r\nSFTON P001\r\nJUMP *A\r\n"}) {
     const test::Corrected made = jbi(job(point, lines));
-    EXPECT_NE(why(made, "C00000").find("SFTON displaces it (line "), std::string::npos) << lines << why(made, "C00000");
+    EXPECT_NE(why(made, "C00000").find("SFTON displaces it (drill.jbi line "), std::string::npos)
+        << lines << why(made, "C00000");
   }
   const test::Corrected off =
       jbi(job(point, "*A\r\nMOVL C00000 V=100.0\r\nSFTON P001\r\nSFTOF\r\nJUMP *A IF IN#(1)=ON\r\n"));
