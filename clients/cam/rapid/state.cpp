@@ -50,7 +50,7 @@ void Setting::set(const Place& place, State& state) {
   if (instruction.name == "gripload") state.load = tools_.load_set(place.module, instruction);
   if (instruction.name == "pdispoff") state.displaced = 0;
   if (instruction.name == "eoffsoff") state.external_displaced = 0;
-  for (std::size_t k = 0; k < state.given_way.size(); ++k) {
+  for (std::size_t k = 0; k < give_ways().size(); ++k) {
     const GiveWay& way = give_ways()[k];
     if (instruction.name.starts_with(way.ends)) state.given_way[k] = 0;
     if (instruction.name != way.begins || (*way.label != '\0' && !has_label(instruction, way.label))) continue;

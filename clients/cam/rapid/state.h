@@ -21,7 +21,7 @@ struct State {
   std::size_t load = 0;                         ///< as Tools numbers them; 0: the tool's own
   std::size_t displaced = 0;                    ///< as Setting has the reason; 0: none
   std::size_t external_displaced = 0;           ///< the same
-  std::array<std::size_t, 3> given_way{};       ///< the same, where the arm does not go where motions say
+  std::array<std::size_t, 4> given_way{};       ///< the same, where the arm does not go where motions say
   std::size_t settings = 0;                     ///< as Setting numbers them
   Confs lines = Confs::kOn, axes = Confs::kOn;  ///< ConfL, ConfJ
   bool operator==(const State&) const = default;
