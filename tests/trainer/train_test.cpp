@@ -292,7 +292,7 @@ TEST(Train, WhatAnOverstatedSigmaHidesIsPromisedAsTheArmsErrorAndSaidWhereItChan
   MeasurementBatch bent = good;  // as no cause bends it
   for (Measurement& m : bent.measurements)
     m.p_W += 1.2e-4 * Vector3(std::sin(7 * m.context.q(1)), std::cos(6 * m.context.q(2)), std::sin(8 * m.context.q(0)));
-  cell->tracker.sigma *= 25;
+  cell->tracker.sigma *= 20;
   const auto [hidden, said] = promised(test::demand(train(cell, bent, quick("M3", "none"))), robot);
   EXPECT_GT(to_mm(hidden), 0.08) << "the arm errs by as much";
   EXPECT_TRUE(said);
