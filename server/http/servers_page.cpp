@@ -32,10 +32,10 @@ std::string served_by(const ServerInRecord& one) {
     served += at.version > 0 ? 1 : 0;
     apart += at.version == 0 && !at.why_not.empty() ? 1 : 0;
   }
-  return counted(served, "cell") + (apart == 0 ? "" : fmt::format(", {} with other files", apart));
+  return counted(served, "cell") + (apart == 0 ? "" : fmt::format(", {} not served", apart));
 }
 
-bool has_other_files(const ServerInRecord& one) {
+bool lacks_cells(const ServerInRecord& one) {
   return std::any_of(one.self.cells.begin(), one.self.cells.end(),
                      [](const auto& named) { return named.second.version == 0 && !named.second.why_not.empty(); });
 }
@@ -60,7 +60,7 @@ HtmlRow server_row(const ServerInRecord& one) {
            : one.behind == 0 ? "up to date"
                              : counted(static_cast<std::size_t>(one.behind), "change"),
            html_text(one.self.program), html_time(one.since)},
-          one.is_gone || has_other_files(one) ? "dark" : "served"};
+          one.is_gone || lacks_cells(one) ? "dark" : "served"};
 }
 
 /// What the servers that are there answer for a cell with: `version 3: first, second`.

@@ -61,6 +61,7 @@ TEST_F(ServersPage, ACellWithOtherFilesIsDarkAndNamesBothServers) {
   const Readiness ready = readiness(server.watched(), ServerPhase::kServing, "");
   EXPECT_FALSE(ready.ready);
   EXPECT_EQ(ready.told["dark"][0]["state"], "described_otherwise");
+  ASSERT_TRUE(server.store().tell_presence(server.trainer().self())) << "as its heartbeat does";
   EXPECT_TRUE(has(servers_page(server.watched()).body, cells[0].why.substr(0, 40)));
   test::SmallBatch measured;
   const auto refused =
