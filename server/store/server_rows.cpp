@@ -1,4 +1,4 @@
-#include "server/store/servers.h"
+#include "server/store/server_rows.h"
 
 #include <unistd.h>
 
@@ -9,7 +9,6 @@
 
 #include "server/store/audit_rows.h"
 #include "server/store/connection.h"
-#include "server/store/server_rows.h"
 #include "server/store/statements.h"
 #include "server/store/store.h"
 
