@@ -52,6 +52,11 @@ TEST(LostZerosOfElbows, AreNamedByPositionsAloneWhereTheInstrumentStandsAsInTheM
     EXPECT_EQ(check.verdict, HealthVerdict::kChanged) << joint << ": " << check.sentence;
     EXPECT_TRUE(names_zero_of(check, joint)) << joint << ": " << check.sentence;
     EXPECT_NE(check.sentence.find("turned as in the model"), std::string::npos) << check.sentence;
+    ASSERT_FALSE(check.changed.empty()) << check.sentence;
+    for (const LostZero& zero : check.changed.front().zeros) {
+      if (zero.joint + 1 != joint) continue;
+      EXPECT_NEAR(zero.by, by, 1.5 * zero.u95) << check.sentence;
+    }
   }
 }
 

@@ -21,6 +21,14 @@ constexpr double kNearlySeen = 10;      // times the limit: a cause that is name
 constexpr double kLeastRest = 1e-12;    // of residuals: less is rounding
 constexpr double kWorseInstrument = 5;  // times a healthy robot's residuals: an instrument may scatter so
 
+/// The number of a zero, and its variance, by the whole kinematics: one that is off by a degree does not act linearly.
+std::optional<Estimate> found_alone(const std::vector<ZerosFit>& fits, std::size_t zero, Index column) {
+  for (const ZerosFit& fit : fits)
+    if (!fit.tool && fit.zeros == std::vector<std::size_t>{zero})
+      return Estimate{fit.at.segment(column, 1), fit.covariance.topLeftCorner(1, 1)};
+  return std::nullopt;
+}
+
 }  // namespace
 
 void Examination::look_for_changes(const CheckTests& healthy) {
@@ -179,9 +187,10 @@ void Examination::tell_change(const Named& named, const CheckTests& tests) {
   change.p_value = named.chance;
   set_size(size(named.hypothesis, found), found, square_here(one.columns, tests.rows()), change);
   const double scale = effects_.scale(entry.columns.front());
+  const bool is_all = named_.size() == 1 && sifted_.bad.empty();
+  const Estimate zero = is_all ? found_alone(fits_, one.cause, entry.columns.front()).value_or(found) : found;
   if (std::find(zeros_.causes().begin(), zeros_.causes().end(), one.cause) != zeros_.causes().end())
-    change.zeros.push_back(
-        {entry.cause.joint, scale * found.numbers(0), 2 * scale * std::sqrt(found.covariance(0, 0))});
+    change.zeros.push_back({entry.cause.joint, scale * zero.numbers(0), 2 * scale * std::sqrt(zero.covariance(0, 0))});
   tell_rivals(named.hypothesis, tests, tests.scores(tests.rows().left(rows_.residual)), change);
   check_.changed.push_back(std::move(change));
 }
