@@ -78,11 +78,11 @@ void Trainer::agree() {
   if (!made || !is_present_ || is_settled) return;
   auto apart = store_.agree_on_cells(presence_.descriptions(), descriptions_ < 0);
   if (!apart) return;
-  // What is told now may have been added to by this very look.
-  descriptions_ = apart->empty() ? store_.descriptions_made().value_or(*made) : *made;
-  if (*apart == cells_.apart()) return;
-  cells_.set_apart(std::move(*apart));
-  presence_.has_changed();
+  descriptions_ = *made;  // what was told since then is compared by the next look
+  if (*apart != cells_.apart()) {
+    cells_.set_apart(std::move(*apart));
+    presence_.has_changed();
+  }
   const auto running = book_.find(runner_.claimed());
   if (!running || !cells_.why_apart(running->cell)) return;
   runner_.lose_claim();  // it is computed from the wrong files

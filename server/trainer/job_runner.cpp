@@ -121,6 +121,9 @@ JobRunner::Attempt JobRunner::attempt(std::int64_t id, const StopRequests& stop)
   }
   lost_ = false;
   claimed_ = id;
+  // The cell may have been set apart while the claim was made: nobody saw a job to end.
+  if (const auto cell = cells_.find(job->cell); !cell)
+    return tl::make_unexpected(Failed{cell.error(), verdict_of(cell.error()), false, {}, true});
   book_.report(progress_at(*job, JobStage::kTraining));
   std::optional<StoredDiagnosis> asked;
   if (job->kind != JobKind::kTrain) {

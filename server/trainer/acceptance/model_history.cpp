@@ -285,6 +285,9 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate, const Judging& judgi
   const std::string& cell = candidate.job.cell;
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
     if (stop.stop_requested()) return failure(ErrorCode::kBusy, "the service stops");
+    // Of the record, since what it has in force may be a version that cannot be loaded here.
+    const auto recorded = store_.version_in_force(cell);
+    if (!recorded) return tl::make_unexpected(recorded.error());
     if (store_.is_shared()) static_cast<void>(follow(cell));  // else the store refuses what was judged beside another
     // Judging takes a while: nobody waits for it. Where somebody changed what is in force meanwhile, it is done again.
     const auto present = registry_.in_force(cell);
@@ -293,21 +296,23 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate, const Judging& judgi
     if (!found) return tl::make_unexpected(found.error());
     const MutexLock lock(changes_of(cell));
     if (registry_.version_in_force(cell) != version) continue;
-    auto kept = store(candidate, *found);
+    auto kept = store(candidate, *found, recorded->value_or(0));
     const bool changed_elsewhere = !kept && kept.error().code == ErrorCode::kConflict;
     if (!changed_elsewhere) return kept;
   }
   const MutexLock lock(changes_of(cell));
+  const auto recorded = store_.version_in_force(cell);
+  if (!recorded) return tl::make_unexpected(recorded.error());
   auto found = judged(candidate, judging, registry_.in_force(cell).get());
   if (!found) return tl::make_unexpected(found.error());
-  return store(candidate, std::move(*found));
+  return store(candidate, std::move(*found), recorded->value_or(0));
 }
 
-Result<Kept> ModelHistory::store(const Candidate& candidate, Judged judged) {
+Result<Kept> ModelHistory::store(const Candidate& candidate, Judged judged, int expected) {
   const std::string& cell = candidate.job.cell;
   ChangeId decided;
   // Of a store with one server the cell's lock says the same.
-  if (judged.put_in_force && store_.is_shared()) decided.expected_version = registry_.version_in_force(cell);
+  if (judged.put_in_force && store_.is_shared()) decided.expected_version = expected;
   const auto version = store_.add_model(cell, candidate.model, candidate.job.id, judged.put_in_force, judged.message,
                                         judged.release, decided, judged.outcome);
   if (!version) return tl::make_unexpected(version.error());

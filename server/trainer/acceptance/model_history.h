@@ -135,8 +135,8 @@ class ModelHistory {
   };
   [[nodiscard]] Result<Judged> judged(const Candidate& candidate, const Judging& judging,
                                       const ServedModel* present) const;
-  /// The cell's lock is held.
-  [[nodiscard]] Result<Kept> store(const Candidate& candidate, Judged judged);
+  /// The cell's lock is held. `expected`: the version that the record had in force when it was judged.
+  [[nodiscard]] Result<Kept> store(const Candidate& candidate, Judged judged, int expected);
   /// What a candidate of the cell is held against; `present` null: none in force.
   [[nodiscard]] Result<Opponents> opponents(const std::string& cell, const ServedModel* present) const;
   /// The last versions that served the cell before the one in force, as far as they can be read.
