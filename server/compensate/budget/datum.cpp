@@ -28,6 +28,7 @@ Told told_by(const Identified& parts, const Eigen::VectorXd& sizes) {
   Told told;
   for (Eigen::Index i = 0; i < parts.covariance.rows(); ++i)
     if (parts.covariance(i, i) > 0) told.free.push_back(i);
+  if (told.free.empty()) return told;
   const auto F = std::ssize(told.free);
   Eigen::VectorXd prior(F);
   for (Eigen::Index k = 0; k < F; ++k)
