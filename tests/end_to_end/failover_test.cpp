@@ -14,8 +14,7 @@ TEST(Failover, WhenTheHostOfThePrimaryIsKilledChangesGoOnAndNothingAcknowledgedI
   ASSERT_EQ(fleet.why_not(), "");
   const auto doctor =
       test::run({TRAMMEL_BINARY_DIR "/clients/trammel", "doctor", "--port", std::to_string(fleet.first->port()),
-                 "--domain", std::to_string(fleet.first->domain()), "--store", fleet.url,
-                 "--json", "-"});
+                 "--domain", std::to_string(fleet.first->domain()), "--store", fleet.url, "--json", "-"});
   EXPECT_NE(doctor.out.find("an acknowledged change survives the loss of one host of three"), std::string::npos)
       << doctor.out << doctor.err;
   EXPECT_NE(fleet.first->process().standard_error().find("survives the loss of one host of three"), std::string::npos);
