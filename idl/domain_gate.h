@@ -57,16 +57,16 @@ class Hearing {
   }
   /// Until it does, kLongest at most.
   void wait() {
-    if (begun_) return;
     MutexLock lock(mutex_);
-    changed_.wait_until(lock, std::chrono::steady_clock::now() + kLongest, [this] { return begun_.load(); });
+    changed_.wait_until(lock, std::chrono::steady_clock::now() + kLongest,
+                        [this]() TRAMMEL_REQUIRES(mutex_) { return begun_; });
   }
 
  private:
   static constexpr std::chrono::seconds kLongest{2};
-  std::atomic<bool> begun_{false};
   Mutex mutex_;
   Condition changed_;
+  bool begun_ TRAMMEL_GUARDED_BY(mutex_) = false;
 };
 
 struct GateOptions {

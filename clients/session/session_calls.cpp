@@ -1,5 +1,4 @@
-#include "clients/session/session.h"
-
+// What a session asks for, and how it follows a job.
 #include <algorithm>
 #include <functional>
 #include <optional>
