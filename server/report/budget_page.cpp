@@ -22,10 +22,9 @@ std::string value_of(const BudgetLine& line) {
   return fmt::format("{} ± {} {}", read.value, read.expanded, html_text(line.value->unit));
 }
 
-/// A bar as wide as its share of the longest one, and its length in words.
+/// A bar as long as its part of the longest one, and its length in words.
 std::string bar(double length, double longest) {
-  const double width = longest > 0 ? 100 * length / longest : 0;
-  return fmt::format(R"(<span class="budget_bar"><i style="width:{:.1f}%"></i></span>{:.4f})", width, to_mm(length));
+  return bar_of(longest > 0 ? length / longest : 0, "budget_bar") + fmt::format("{:.4f}", to_mm(length));
 }
 
 std::string named(const BudgetLine& line) {
@@ -53,6 +52,12 @@ HtmlRow row_of(const BudgetLine& line, double longest, const std::map<std::strin
 }
 
 }  // namespace
+
+std::string bar_of(double share, const char* kind) {
+  return fmt::format(R"(<svg class="{}" viewBox="0 0 100 10" preserveAspectRatio="none" aria-hidden="true">)"
+                     R"(<rect width="{:.1f}" height="10"/></svg>)",
+                     kind, 100 * share);
+}
 
 std::string budget_section(const std::optional<ErrorBudget>& budget) {
   if (!budget || budget->as_it_stands.lines.empty())

@@ -11,4 +11,7 @@ namespace trammel {
 /// do. Says so where there is none.
 [[nodiscard]] std::string budget_section(const std::optional<ErrorBudget>& budget);
 
+/// A bar of `share` (0 to 1) of its place, as pages may have it (page_policy.h): without a style of its own.
+[[nodiscard]] std::string bar_of(double share, const char* kind);
+
 }  // namespace trammel

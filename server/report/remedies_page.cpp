@@ -20,10 +20,8 @@ std::string steps_table(const ErrorBudget& budget) {
   for (const PutRight& step : budget.put_right) longest = std::max(longest, step.left_rms);
   std::vector<HtmlRow> rows;
   for (const PutRight& step : budget.put_right) {
-    const double width = longest > 0 ? 100 * step.left_rms / longest : 0;
-    rows.push_back(
-        {{html_text(step.name), fmt::format(R"(<span class="step_bar"><i style="width:{:.1f}%"></i></span>)", width),
-          fmt::format("{:.4f}", to_mm(step.left_rms))}});
+    const double share = longest > 0 ? step.left_rms / longest : 0;
+    rows.push_back({{html_text(step.name), bar_of(share, "step_bar"), fmt::format("{:.4f}", to_mm(step.left_rms))}});
   }
   return html_table({"steps", {"put right, one after the other", "", "left, mm rms"}, rows});
 }

@@ -18,7 +18,4 @@ inline constexpr const char* kMovedField = "moved";    // what the error of such
 /// Says in the trail, at the end of the open transaction, where the store goes on.
 void record_move(Database& database, const std::string& to);
 
-/// A store that was moved is taken up again, since the other one is given up. Refuses one that was not moved.
-[[nodiscard]] Status reopen_store(const std::string& place);
-
 }  // namespace trammel

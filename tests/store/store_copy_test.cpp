@@ -8,6 +8,7 @@
 #include "server/compensate/model_file.h"
 #include "server/store/audit.h"
 #include "server/store/moved.h"
+#include "server/store/reopen.h"
 #include "server/store/store_check.h"
 #include "server/store/store_place.h"
 #include "tests/store/store_under_test.h"

@@ -13,6 +13,7 @@
 #include "clients/cam/rapid/interpreter.h"
 #include "clients/cam/rapid/motions.h"
 #include "clients/cam/rapid/order.h"
+#include "clients/cam/rapid/parser.h"
 #include "clients/cam/rapid/readings.h"
 #include "clients/cam/rapid/state.h"
 #include "clients/cam/rapid/targets.h"

@@ -147,7 +147,4 @@ struct Module {
   std::vector<Unbalanced> unbalanced;
 };
 
-/// Never fails: what is not understood is not there.
-[[nodiscard]] Module parse(std::string_view text);
-
 }  // namespace trammel::cam::rapid

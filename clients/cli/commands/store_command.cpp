@@ -6,7 +6,7 @@
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
-#include "server/store/moved.h"
+#include "server/store/reopen.h"
 #include "server/store/store_copy.h"
 #include "server/store/store_describe.h"
 #include "server/store/store_init.h"

@@ -9,6 +9,7 @@
 #include "server/base/units.h"
 #include "server/compensate/budget/effects.h"
 #include "server/compensate/budget/usual.h"
+#include "server/error_sources/catalogue.h"
 #include "server/measurement/gauges.h"
 
 namespace trammel {
@@ -204,11 +205,16 @@ LeftAt left_by(const CompensatedModel& model, const MeasurementBatch& positions)
   return {R_WB * errors.nominal, R_WB * errors.calibrated, R_WB * errors.compensated};
 }
 
+bool is_of_payload(const BudgetLine& line) {
+  const CauseRecord* cause = find_cause(line.cause);
+  return cause != nullptr && cause->part == causes::Part::kPayload;
+}
+
 /// What a shop puts right in this step, beside its frames.
 bool is_of_step(const BudgetLine& line, std::string_view step) {
   if (step == "zeros") return line.kind == LineKind::kJointZero;
   if (step == "lengths") return line.kind == LineKind::kLength || line.kind == LineKind::kTwist;
-  if (step == "load") return line.kind == LineKind::kJointCompliance || line.cause == "payload";
+  if (step == "load") return line.kind == LineKind::kJointCompliance || is_of_payload(line);
   return false;
 }
 

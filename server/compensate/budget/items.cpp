@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <map>
 
-#include "server/error_sources/instruments.h"
+#include "server/error_sources/anchors.h"
 #include "server/error_sources/spelling.h"
 
 namespace trammel {
@@ -102,7 +102,15 @@ BudgetItem whole(const PhysicalModel& model, std::size_t source, Eigen::Index fi
   return item;
 }
 
-bool is_own_weight(const ErrorSource& source) { return source.cause().spelling == "self_weight"; }
+/// The gearboxes: one parameter for each joint that gives way.
+bool is_of_gearboxes(const ErrorSource& source) {
+  return source.cause().gives_way && source.cause().numbers == causes::Numbers::kOneAJoint;
+}
+
+/// The links' own weights: a load that a training adds beside the gearboxes.
+bool is_own_weight(const ErrorSource& source) {
+  return source.cause().acts.on == causes::ActsOn::kLoad && source.cause().added_by_data;
+}
 
 /// Payload, balancers, cables: what the gearboxes then carry.
 bool changes_load(const ErrorSource& source) {
@@ -140,7 +148,7 @@ std::vector<BudgetItem> items_of(const PhysicalModel& model) {
       add_links(model, k, first, items);
     } else if (source.cause().part == causes::Part::kTool) {
       add_tools(model, k, first, items);
-    } else if (source.cause().spelling == "compliance") {
+    } else if (is_of_gearboxes(source)) {
       add_gearboxes(model, k, first, items);
     } else if (!is_of_instruments(source) && !is_own_weight(source)) {
       items.push_back(whole(model, k, first));

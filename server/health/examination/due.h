@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "server/health/health_check.h"
+#include "server/health/health_verdict.h"
 
 /// When the next check is due.
 namespace trammel::health {

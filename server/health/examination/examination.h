@@ -11,7 +11,7 @@
 #include "server/health/examination/due.h"
 #include "server/health/examination/sizes.h"
 #include "server/health/examination/verdict.h"
-#include "server/health/health_check.h"
+#include "server/health/health_verdict.h"
 
 /// A check's residuals are tested for each single cause beside base (and tool), for single bad poses, and as a whole.
 /// What explains most for its number of parameters (Schwarz's price, log R for each) is taken: a bad pose is refitted

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "server/health/health_check.h"
+#include "server/health/health_verdict.h"
 
 /// What stands beside a change that was seen.
 namespace trammel::health {

@@ -1,6 +1,7 @@
 #pragma once
 
-#include "server/health/health_check.h"
+#include "server/health/foreign_poses.h"
+#include "server/health/health_verdict.h"
 
 /// What a check comes to, and the sentence that says why.
 namespace trammel::health {

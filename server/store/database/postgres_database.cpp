@@ -168,7 +168,7 @@ bool is_refused_for_good(PGconn* connection, const std::string& told) {
   if (::PQconnectionNeedsPassword(connection) != 0) return true;
   const std::size_t at = told.find("FATAL:");
   if (at == std::string::npos) return false;
-  const auto says = [why = told.substr(at)](const char* what) { return why.find(what) != std::string::npos; };
+  const auto says = [answer = told.substr(at)](const char* text) { return answer.find(text) != std::string::npos; };
   // The last four are a pooler's, whose server is away.
   constexpr std::array kForNow = {
       "starting up", "not yet accepting", "shutting down",      "recovery",       "too many",

@@ -1,4 +1,4 @@
-#include "clients/cam/rapid/syntax.h"
+#include "clients/cam/rapid/parser.h"
 
 #include <fmt/format.h>
 
