@@ -12,8 +12,10 @@ test::Finished without_names(const std::vector<std::string>& command) {
   const test::TemporaryFolder folder;
   const std::string resolver = folder.write("resolv.conf", "nameserver 10.9.9.2\n");
   constexpr const char* kMake =
-      "set -e; mount --bind \"$0\" /etc/resolv.conf; ip link set lo up; ip link add nowhere type dummy; "
-      "ip address add 10.9.9.1/24 dev nowhere; ip link set nowhere up; exec \"$@\"";
+      "set -e; mount --bind \"$0\" /etc/resolv.conf; ip link set lo up; "
+      "ip link add nowhere type veth peer name nobody; ip link set nobody up; ip link set nowhere up; "
+      "ip address add 10.9.9.1/24 dev nowhere; ip neighbour add 10.9.9.2 lladdr 02:00:00:00:00:02 dev nowhere; "
+      "exec \"$@\"";
   std::vector<std::string> whole = {"/usr/bin/unshare", "--mount", "--net", "/bin/bash", "-c", kMake, resolver};
   whole.insert(whole.end(), command.begin(), command.end());
   return test::run(whole);
