@@ -223,6 +223,17 @@ TEST(ErrorBudget, NamesWhatTooFewPosesCannotTellInOneLine) {
   for (const BudgetLine& line : budget_of(model).as_it_stands.lines) EXPECT_EQ(line.action, "") << line.line;
 }
 
+TEST(ErrorBudget, OfAModelWithoutAnyParameterIsWhatIsLeft) {
+  World world;
+  world.base = Vector3(0.002, 0, 0);
+  const CompensatedModel model = trained(world, "");
+  const ErrorBudget& budget = budget_of(model);
+  EXPECT_NEAR(sum_of_shares(budget.as_it_stands), 1, 1e-9);
+  const BudgetLine* rest = budget.line("rest");
+  ASSERT_NE(rest, nullptr);
+  EXPECT_NEAR(1e3 * rest->alone_rms, 2, 0.05);
+}
+
 TEST(ErrorBudget, SaysWhatEachStepLeaves) {
   World world;
   world.zeros(3) = 3 * kDegree;

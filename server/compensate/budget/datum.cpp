@@ -160,8 +160,9 @@ Datum datum_of(const Identified& found, const std::vector<PoseContext>& poses) {
       datum.on_drawing.push_back({parameter, partners(direction, parameter, on_drawing, effect)});
     }
     for (const Eigen::Index parameter : on_drawing) datum.model.values(parameter) = 0;
-    match(datum.model, kept, sizes, positions_of(physics, poses), poses);
+    if (!kept.empty()) match(datum.model, kept, sizes, positions_of(physics, poses), poses);
   }
+  if (kept.empty()) return datum;
   settle(datum, kept, sizes, told.information(kept_of_free, kept_of_free));
   return datum;
 }
