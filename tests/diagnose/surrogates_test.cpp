@@ -72,7 +72,7 @@ TEST(Unrecorded, DirectionIsThatOfTheWayFromThePoseBefore) {
   EXPECT_TRUE(put.time && put.temperature && put.direction);
   std::vector<int> directions;
   for (const Measurement& m : batch.measurements) directions.push_back(m.context.direction.at(0));
-  EXPECT_EQ(directions, (std::vector<int>{0, 1, 0, -1}));
+  EXPECT_EQ(directions, (std::vector<int>{0, 1, 1, -1}));  // a joint that stays stands as it came
   take_out_surrogates(put, batch);
   EXPECT_TRUE(batch.measurements[1].context.direction.empty());
   EXPECT_FALSE(batch.measurements[1].context.time || batch.measurements[1].context.temperature);

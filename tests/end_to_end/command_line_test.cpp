@@ -114,7 +114,7 @@ std::vector<std::string> commands_of(const std::string& help) {
 
 TEST_F(CommandLine, HelpOfEveryCommandSaysTheUnitOfEveryQuantity) {
   const std::regex blanks("\\s+"), goes_with("(Needs|Excludes): --"),
-      unit(", (s|mm|N)\\b|\\bshare\\b|standard deviation", std::regex::icase);
+      unit(", (s|mm|N)\\b|\\bshare\\b|standard deviation|\\bpulses\\b", std::regex::icase);
   int quantities = 0;
   for (const std::string& command : commands_of(must({"--help"}).out)) {
     const std::string one_line = std::regex_replace(must({command, "--help"}).out, blanks, " ");

@@ -288,8 +288,11 @@ TEST_F(Fleet, StoppingAndStartingOneAfterTheOtherLosesNoRequest) {
       EXPECT_EQ(daemon->stop(), 0);
       daemon->start();
     });
-    for (int asked = 0; asked < 200 || restarted.wait_for(seconds(0)) != std::future_status::ready; ++asked)
-      ASSERT_EQ(served(*session), 1) << asked;
+    for (int asked = 0; asked < 200 || restarted.wait_for(seconds(0)) != std::future_status::ready; ++asked) {
+      const auto answer = session->predict_error(kContext, test::virtual_joints(1, 7));
+      ASSERT_TRUE(answer) << asked << ": " << sentence(answer.error());
+      ASSERT_EQ(answer->model.version, 1) << asked;
+    }
   }
 }
 

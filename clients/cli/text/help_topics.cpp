@@ -164,7 +164,7 @@ constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
      "  trammel store copy --keep-source postgresql://owner@db-1/trammel monday.db\n"
      "  trammel store reopen data/trammel.db\n"
      "  trammel store check data/trammel.db\n"
-     "  trammel store describe postgresql://trammel@db-1/trammel --cell cell-7 --as line-2"},
+     "  trammel store describe postgresql://db-1/trammel --cell cell-7 --as line-2"},
     {"help", "  trammel help\n  trammel help formats\n  trammel help train"},
     {"doctor", "  trammel doctor\n  trammel doctor --port 17501 --store data/trammel.db --json -"},
     {"completion",
