@@ -468,19 +468,27 @@ Status Trainer::activate(const std::string& cell, int version, const ChangeId& i
   const auto made = store_.outcome_of(id);
   if (!made) return tl::make_unexpected(made.error());
   if (*made) return {};
-  ChangeId decided = id;
-  if (store_.is_shared()) {  // it is judged beside what the record has in force, and beside nothing else
+  const auto as_judged = [&](const ChangeId& decided) -> Status {
+    if (const Status as_seen = store_.check_expected(cell, decided); !as_seen) return as_seen;
+    const auto judged = judged_beside_present(cell, version);
+    if (!judged && !force) return tl::make_unexpected(judged.error());
+    const std::optional<GateVerdict> verdict = judged ? *judged : std::nullopt;
+    const Status wanted = verdict && !force ? check_not_worse(cell, version, *verdict) : Status();
+    return wanted ? history_.activate(cell, version, decided, verdict) : wanted;
+  };
+  if (!store_.is_shared()) return as_judged(id);
+  // It is judged beside what the record has in force, and again where somebody changed that meanwhile.
+  constexpr int kMostAttempts = 8;
+  for (int attempt = 1;; ++attempt) {
     static_cast<void>(history_.follow(cell));
     const auto recorded = store_.version_in_force(cell);
     if (!recorded) return tl::make_unexpected(recorded.error());
+    ChangeId decided = id;
     if (!decided.expected_version) decided.expected_version = recorded->value_or(0);
+    const Status done = as_judged(decided);
+    const bool changed_meanwhile = !done && !id.expected_version && done.error().code == ErrorCode::kConflict;
+    if (!changed_meanwhile || attempt == kMostAttempts) return done;
   }
-  if (const Status as_seen = store_.check_expected(cell, decided); !as_seen) return as_seen;
-  const auto judged = judged_beside_present(cell, version);
-  if (!judged && !force) return tl::make_unexpected(judged.error());
-  const std::optional<GateVerdict> verdict = judged ? *judged : std::nullopt;
-  const Status wanted = verdict && !force ? check_not_worse(cell, version, *verdict) : Status();
-  return wanted ? history_.activate(cell, version, decided, verdict) : wanted;
 }
 
 Result<std::optional<GateVerdict>> Trainer::judged_beside_present(const std::string& cell_name, int version) const {
