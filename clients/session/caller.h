@@ -91,7 +91,6 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
  private:
   static constexpr std::size_t kTraceBytes = 8;  // of the partition's name
   static constexpr std::chrono::milliseconds kHedge{100};
-  static constexpr std::chrono::milliseconds kRepeat{1000};  // of what all servers answer alike
 
   /// A call under way. An element of waiting_, guarded by the same mutex.
   struct Waiting {
@@ -103,9 +102,9 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
       : publisher_(publisher), subscriber_(subscriber), partition_(std::move(partition)), watch_(watch) {}
 
   /// The times that a request is sent. What all servers answer alike is asked of a second one where the first is silent
-  /// for kHedge, or leaves. At half of the time it is sent once more, then each second; what changes something to the
-  /// same server, or, where that one has left, to another one of its record: those make a change once under its id.
-  /// Once more where who was asked has left only then.
+  /// for kHedge, or leaves. At half of the time it is sent once more; what changes something to the same server, or,
+  /// where that one has left, to another one of its record: those make a change once under its id. Once more where who
+  /// was asked has left only then.
   enum class Sending { kFirst, kHedge, kAgain, kOfOthers };
   struct Asked {
     std::set<std::string> participants;
@@ -121,39 +120,25 @@ class Caller final : private wire::dds::DataWriterListener, private wire::dds::D
       if (sending == Sending::kHedge && (!hedges || asked.first.empty())) continue;
       if (sending == Sending::kOfOthers && !has_left(asked.participants)) break;
       const bool is_late = sending == Sending::kAgain || sending == Sending::kOfOthers;
+      if (const auto server = find_server(sending, route, asked, is_late ? deadline : half)) {
+        asked.last = server->id();
+        if (asked.first.empty()) asked.first = asked.last;
+        asked.record = server->status.record().to_string();
+        asked.participants.insert(server->participant);
+        request.header().server(asked.last);
+        request.header().deadline_ms(milliseconds_until(deadline));
+        if (!writer_->write(&request)) {
+          return failure(ErrorCode::kTooLarge, "{}: the request is too large", Operation::kName);
+        }
+      }
       auto until = is_late ? deadline : half;
-      if (!send(sending, request, route, until, deadline, asked))
-        return failure(ErrorCode::kTooLarge, "{}: the request is too large", Operation::kName);
       if (sending == Sending::kFirst && hedges) until = std::min(until, Clock::now() + kHedge);
-      if (is_late && hedges) until = std::min(until, Clock::now() + kRepeat);
-      if (auto reply = reply_to(request, asked, until)) return *std::move(reply);
-    }
-    // A server that has just started may have answered before it and this session heard of each other.
-    while (hedges && Clock::now() < deadline) {
-      if (!send(Sending::kAgain, request, route, deadline, deadline, asked)) break;
-      if (auto reply = reply_to(request, asked, std::min(deadline, Clock::now() + kRepeat))) return *std::move(reply);
+      if (auto reply = wait_for_reply(request.header().request_id().sequence_number(), asked.participants, until)) {
+        if (reply->header().server().to_string() != asked.first) watch_.was_slow(asked.first);
+        return *std::move(reply);
+      }
     }
     return unanswered(asked.last);
-  }
-
-  /// Sends the request to a server that is found until then, if there is one. False: it is too large.
-  bool send(Sending sending, Request& request, const Route& route, Clock::time_point until, Clock::time_point deadline,
-            Asked& asked) {
-    const auto server = find_server(sending, route, asked, until);
-    if (!server) return true;
-    asked.last = server->id();
-    if (asked.first.empty()) asked.first = asked.last;
-    asked.record = server->status.record().to_string();
-    asked.participants.insert(server->participant);
-    request.header().server(asked.last);
-    request.header().deadline_ms(milliseconds_until(deadline));
-    return writer_->write(&request);
-  }
-
-  std::optional<Reply> reply_to(const Request& request, const Asked& asked, Clock::time_point until) {
-    auto reply = wait_for_reply(request.header().request_id().sequence_number(), asked.participants, until);
-    if (reply && reply->header().server().to_string() != asked.first) watch_.was_slow(asked.first);
-    return reply;
   }
 
   /// Whether nobody of them is there any more.
