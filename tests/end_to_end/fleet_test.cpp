@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <functional>
+#include <atomic>
 #include <future>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -284,15 +285,19 @@ TEST_F(Fleet, StoppingAndStartingOneAfterTheOtherLosesNoRequest) {
   ASSERT_TRUE(end_of(*session, submit(*session, "b1", 1)).in_force);
   wait_until([&] { return served(*other) == 1; }, "the other one serves it");
   for (test::Daemon* daemon : {&first_, &second_}) {
-    auto restarted = std::async(std::launch::async, [daemon] {
-      EXPECT_EQ(daemon->stop(), 0);
-      daemon->start();
+    std::atomic<bool> is_restarted = false;
+    // The thread that starts a process must live as long as it does.
+    auto asking = std::async(std::launch::async, [&] {
+      for (int asked = 0; asked < 200 || !is_restarted; ++asked) {
+        const auto answer = session->predict_error(kContext, test::virtual_joints(1, 7));
+        ASSERT_TRUE(answer) << asked << ": " << sentence(answer.error());
+        ASSERT_EQ(answer->model.version, 1) << asked;
+      }
     });
-    for (int asked = 0; asked < 200 || restarted.wait_for(seconds(0)) != std::future_status::ready; ++asked) {
-      const auto answer = session->predict_error(kContext, test::virtual_joints(1, 7));
-      ASSERT_TRUE(answer) << asked << ": " << sentence(answer.error());
-      ASSERT_EQ(answer->model.version, 1) << asked;
-    }
+    EXPECT_EQ(daemon->stop(), 0);
+    daemon->start();
+    is_restarted = true;
+    asking.get();
   }
 }
 
