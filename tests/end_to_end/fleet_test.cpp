@@ -3,9 +3,9 @@
 #include <signal.h>
 
 #include <algorithm>
+#include <atomic>
 #include <filesystem>
 #include <functional>
-#include <atomic>
 #include <future>
 #include <map>
 #include <nlohmann/json.hpp>
