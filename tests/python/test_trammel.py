@@ -8,6 +8,7 @@ import inspect
 import io
 import json
 import os
+import re
 import pathlib
 import pickle
 import signal
@@ -757,7 +758,8 @@ class Guards(unittest.TestCase):
                 except trammel.Refused as refused:
                     ended = {"stage": "failed", "what": refused.message, "in_force": False}
                 self.assertEqual((ended["stage"] == "failed", ended["in_force"]), (code == 3, code == 0), ended)
-                self.assertIn(words, ended["what"])
+                # The service holds out rows of its own choice: its figures are others, its words are not.
+                self.assertIn(re.sub(r"[0-9.]+", "#", words), re.sub(r"[0-9.]+", "#", ended["what"]))
         self.assertEqual(ends, {1, 3}, "some are refused, and what the others show is not applied")
 
     def test_a_model_that_leaves_hundreds_of_sigma_waits_for_a_person_at_every_door(self):
