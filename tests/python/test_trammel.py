@@ -758,7 +758,7 @@ class Guards(unittest.TestCase):
                 except trammel.Refused as refused:
                     ended = {"stage": "failed", "what": refused.message, "in_force": False}
                 self.assertEqual((ended["stage"] == "failed", ended["in_force"]), (code == 3, code == 0), ended)
-                # The service holds out rows of its own choice: its figures are others, its words are not.
+                # The service holds out other rows (17, not 12): its figures differ, which is a defect.
                 self.assertIn(re.sub(r"[0-9.]+", "#", words), re.sub(r"[0-9.]+", "#", ended["what"]))
         self.assertEqual(ends, {1, 3}, "some are refused, and what the others show is not applied")
 

@@ -5,8 +5,8 @@
 /// What arms of their kind show, by which a value is judged.
 namespace trammel {
 
-/// What a healthy arm of this size does not exceed in about one of twenty cases, SI. The README of this room names the
-/// sources.
+/// What a healthy arm of this size does not exceed in about one of twenty cases, SI. Estimates of
+/// this project: no published table stands behind them.
 struct UsualSizes {
   double zero = 0, twist = 0;  ///< rad
   double rail_zero = 0;        ///< m
