@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -114,6 +115,12 @@ template <typename... Args>
   return Failure(std::move(error));
 }
 
+/// What `TRY` hands out: a copy of the value of a named result, the moved value of a temporary one.
+template <typename R>
+auto value_of(R&& result) {
+  if constexpr (!std::is_void_v<typename std::remove_cvref_t<R>::value_type>) return *std::forward<R>(result);
+}
+
 /// Data that must not be used.
 template <typename... Args>
 [[nodiscard]] Failure refused(fmt::format_string<Args...> text, Args&&... args) {
@@ -121,3 +128,12 @@ template <typename... Args>
 }
 
 }  // namespace trammel
+
+/// The value of a `Result`, or the way out: where `expression` failed, the function that stands around it returns its
+/// error as it is. A `Status` has no value. Example: `const Cell cell = TRY(read_cell(path));`
+#define TRY(expression)                                                                      \
+  (__extension__({                                                                           \
+    auto&& tried_ = (expression);                                                            \
+    if (!tried_) return tl::make_unexpected(std::forward<decltype(tried_)>(tried_).error()); \
+    trammel::value_of(std::forward<decltype(tried_)>(tried_));                               \
+  }))
