@@ -48,7 +48,7 @@ wire::Change to_wire(const ChangeOptions& options) {
 
 Result<SessionOptions> completed(SessionOptions options) {
   if (!options.discovery_servers.empty()) {
-    if (const Status found = add_found_places(options); !found) return tl::make_unexpected(found.error());
+    TRY(add_found_places(options));
   }
   if (options.servers.empty()) {
     for (const std::uint16_t port : options.server_ports) options.servers.push_back({options.address, port});
@@ -71,9 +71,8 @@ Result<wire::ParticipantPtr> participant_of(const SessionOptions& options) {
   how.address = options.address;
   how.peers = options.servers;
   if (!options.security.empty()) {
-    auto security = wire::read_security(options.security);
-    if (!security) return tl::make_unexpected(security.error());
-    how.security = std::move(*security);
+    auto security = TRY(wire::read_security(options.security));
+    how.security = std::move(security);
   }
   return wire::make_participant(how);
 }
@@ -122,9 +121,8 @@ Result<std::vector<wire::ReadModelsReply>> Session::Participant::read_all(const 
   if (known.empty()) return tl::make_unexpected(no_server());
   std::vector<wire::ReadModelsReply> replies;
   for (const KnownServer& server : known) {
-    auto reply = read(cell, server.id(), what, asked);
-    if (!reply) return tl::make_unexpected(reply.error());
-    replies.push_back(std::move(*reply));
+    auto reply = TRY(read(cell, server.id(), what, asked));
+    replies.push_back(std::move(reply));
   }
   return replies;
 }
@@ -146,9 +144,8 @@ Result<std::int64_t> Session::Participant::release(const std::string& cell, cons
   request.batch_ids(batch_ids);
   request.change(to_wire(change));
   request.reason(change.reason);
-  const auto reply = call<wire::ReleaseBatches>(request, {cell, {}, true});
-  if (!reply) return tl::make_unexpected(reply.error());
-  return accepted(*reply);
+  const auto reply = TRY(call<wire::ReleaseBatches>(request, {cell, {}, true}));
+  return accepted(reply);
 }
 
 void Session::Participant::remember(std::int64_t job, const std::string& server) {
@@ -177,10 +174,9 @@ std::set<std::string> Session::Participant::may_have(std::int64_t number) {
 Result<wire::Job> Session::Participant::job(const std::string& server, std::int64_t number) {
   wire::ReadModelsRequest request;
   request.job(number);
-  auto reply = read({}, server, wire::READ_JOB, std::move(request), record_of(server));
-  if (!reply) return tl::make_unexpected(reply.error());
-  if (reply->jobs().size() != 1) return failure(ErrorCode::kInternal, "server {} answered no job", server);
-  return reply->jobs().front();
+  auto reply = TRY(read({}, server, wire::READ_JOB, std::move(request), record_of(server)));
+  if (reply.jobs().size() != 1) return failure(ErrorCode::kInternal, "server {} answered no job", server);
+  return reply.jobs().front();
 }
 
 Result<wire::Job> Session::Participant::job_of_cell(const std::string& server, std::int64_t number,

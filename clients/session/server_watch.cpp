@@ -14,32 +14,28 @@ Result<std::unique_ptr<ServerWatch>> ServerWatch::open(wire::dds::DomainParticip
                                                        wire::dds::Subscriber& subscriber, std::size_t named) {
   std::unique_ptr<ServerWatch> watch(new ServerWatch(named));
   ServerWatch* self = watch.get();
-  auto status = wire::StateReader<wire::ServiceStatusTopic>::open(
+  auto status = TRY(wire::StateReader<wire::ServiceStatusTopic>::open(
       participant, subscriber, wire::state_reader_qos(),
       [self](const wire::ServiceStatus* sample, const std::string& writer, double written) {
         self->on_status(sample, writer, written);
-      });
-  if (!status) return tl::make_unexpected(status.error());
-  watch->status_reader_ = std::move(*status);
-  auto old_status = wire::StateReader<wire::OldServiceStatusTopic>::open(
+      }));
+  watch->status_reader_ = std::move(status);
+  auto old_status = TRY(wire::StateReader<wire::OldServiceStatusTopic>::open(
       wire::make_old_status_topic(participant), subscriber, wire::state_reader_qos(),
       [self](const contract_1::ServiceStatus* sample, const std::string& writer, double) {
         self->on_old_status(sample, writer);
-      });
-  if (!old_status) return tl::make_unexpected(old_status.error());
-  watch->old_status_reader_ = std::move(*old_status);
-  auto model = wire::StateReader<wire::ModelStatusTopic>::open(
+      }));
+  watch->old_status_reader_ = std::move(old_status);
+  auto model = TRY(wire::StateReader<wire::ModelStatusTopic>::open(
       participant, subscriber, wire::state_reader_qos(),
       [self](const wire::ModelStatus* sample, const std::string& writer, double written) {
         self->on_model(sample, writer, written);
-      });
-  if (!model) return tl::make_unexpected(model.error());
-  watch->model_reader_ = std::move(*model);
-  auto progress = wire::StateReader<wire::TrainingProgressTopic>::open(
+      }));
+  watch->model_reader_ = std::move(model);
+  auto progress = TRY(wire::StateReader<wire::TrainingProgressTopic>::open(
       participant, subscriber, wire::progress_reader_qos(),
-      [self](const wire::TrainingProgress* sample, const std::string&, double) { self->on_progress(sample); });
-  if (!progress) return tl::make_unexpected(progress.error());
-  watch->progress_reader_ = std::move(*progress);
+      [self](const wire::TrainingProgress* sample, const std::string&, double) { self->on_progress(sample); }));
+  watch->progress_reader_ = std::move(progress);
   return watch;
 }
 

@@ -25,9 +25,8 @@ Result<std::unique_ptr<Session>> Session::open(const SessionOptions& asked) {
   auto options = completed(asked);
   if (!options) return tl::make_unexpected(options.error());
   inside->options = *std::move(options);
-  auto participant = participant_of(inside->options);
-  if (!participant) return tl::make_unexpected(participant.error());
-  inside->participant = std::move(*participant);
+  auto participant = TRY(participant_of(inside->options));
+  inside->participant = std::move(participant);
 
   inside->partition = make_name("client");
   inside->request_publisher = inside->participant->create_publisher(wire::publisher_qos({}));
@@ -36,9 +35,8 @@ Result<std::unique_ptr<Session>> Session::open(const SessionOptions& asked) {
   if (inside->request_publisher == nullptr || inside->reply_subscriber == nullptr || states == nullptr) {
     return failure(ErrorCode::kInternal, "cannot create the publisher and the subscribers of a session");
   }
-  auto watch = ServerWatch::open(*inside->participant, *states, inside->options.servers.size());
-  if (!watch) return tl::make_unexpected(watch.error());
-  inside->watch = std::move(*watch);
+  auto watch = TRY(ServerWatch::open(*inside->participant, *states, inside->options.servers.size()));
+  inside->watch = std::move(watch);
   return std::unique_ptr<Session>(new Session(std::move(inside)));
 }
 
@@ -97,7 +95,7 @@ Result<std::vector<ServerStatus>> Session::servers_when(
 }
 
 Result<std::vector<ModelInfo>> Session::model_status() {
-  if (const auto known = servers(); !known) return tl::make_unexpected(known.error());
+  TRY(servers());
   std::vector<ModelInfo> models;
   for (const wire::ModelInfo& model : participant_->watch->models_in_force()) models.push_back(from_wire(model));
   return models;
@@ -106,10 +104,9 @@ Result<std::vector<ModelInfo>> Session::model_status() {
 Result<JobStatus> Session::wait_for_job(std::int64_t job, std::chrono::milliseconds limit,
                                         const std::function<void(const JobStatus&)>& listener) {
   const auto deadline = Clock::now() + limit;
-  const auto found = participant_->find_job(job);
-  if (!found) return tl::make_unexpected(found.error());
-  const std::string& server = found->first;
-  JobStatus status = status_of(found->second);
+  const auto found = TRY(participant_->find_job(job));
+  const std::string& server = found.first;
+  JobStatus status = status_of(found.second);
   std::uint64_t seen = 0;
   while (true) {
     if (listener) listener(status);

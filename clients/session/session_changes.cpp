@@ -33,15 +33,14 @@ wire::TrainRequest training_of_diagnosis(const std::string& cell, const std::str
 
 Result<std::int64_t> Session::submit_measurements(const std::string& cell, const std::string& batch_id,
                                                   const std::string& csv) {
-  if (const Status fits = check_text("batch " + batch_id, csv); !fits) return tl::make_unexpected(fits.error());
+  TRY(check_text("batch " + batch_id, csv));
   wire::SubmitMeasurementsRequest request;
   request.change_id(make_name("change"));
   request.about().cell(cell);
   request.batch_id(batch_id);
   request.csv(csv);
-  const auto reply = participant_->call<wire::SubmitMeasurements>(std::move(request), {cell, {}, true});
-  if (!reply) return tl::make_unexpected(reply.error());
-  return participant_->accepted(*reply);
+  const auto reply = TRY(participant_->call<wire::SubmitMeasurements>(std::move(request), {cell, {}, true}));
+  return participant_->accepted(reply);
 }
 
 Result<std::int64_t> Session::train(const std::string& cell, const std::vector<std::string>& batch_ids,
@@ -52,42 +51,38 @@ Result<std::int64_t> Session::train(const std::string& cell, const std::vector<s
   request.batch_ids(batch_ids);
   request.level(level);
   request.bias(bias);
-  const auto reply = participant_->call<wire::Train>(std::move(request), {cell, {}, true});
-  if (!reply) return tl::make_unexpected(reply.error());
-  return participant_->accepted(*reply);
+  const auto reply = TRY(participant_->call<wire::Train>(std::move(request), {cell, {}, true}));
+  return participant_->accepted(reply);
 }
 
 Result<std::int64_t> Session::diagnose(const std::string& cell, const std::string& batch_id, const std::string& csv,
                                        bool apply, const ChangeOptions& change) {
-  if (const Status fits = check_text("the batch", csv); !fits) return tl::make_unexpected(fits.error());
+  TRY(check_text("the batch", csv));
   const Route route{cell, {}, true};
   if (apply) {
-    const auto reply = participant_->call<wire::Train>(training_of_diagnosis(cell, batch_id, csv, change), route);
-    if (!reply) return tl::make_unexpected(reply.error());
-    return participant_->accepted(*reply);
+    const auto reply = TRY(participant_->call<wire::Train>(training_of_diagnosis(cell, batch_id, csv, change), route));
+    return participant_->accepted(reply);
   }
   wire::DiagnoseRequest request;
   request.about().cell(cell);
   request.change_id(change_id(change));
   request.batch_id(batch_id);
   request.csv(csv);
-  const auto reply = participant_->call<wire::Diagnose>(std::move(request), route);
-  if (!reply) return tl::make_unexpected(reply.error());
-  return participant_->accepted(*reply);
+  const auto reply = TRY(participant_->call<wire::Diagnose>(std::move(request), route));
+  return participant_->accepted(reply);
 }
 
 Result<std::int64_t> Session::check_health(const std::string& cell, const std::string& batch_id, const std::string& csv,
                                            double tolerance_mm, const ChangeOptions& change) {
-  if (const Status fits = check_text("the batch", csv); !fits) return tl::make_unexpected(fits.error());
+  TRY(check_text("the batch", csv));
   wire::CheckHealthRequest request;
   request.about().cell(cell);
   request.change_id(change_id(change));
   request.batch_id(batch_id);
   request.csv(csv);
   request.tolerance_mm(tolerance_mm);
-  const auto reply = participant_->call<wire::CheckHealth>(std::move(request), Route{cell, {}, true});
-  if (!reply) return tl::make_unexpected(reply.error());
-  return participant_->accepted(*reply);
+  const auto reply = TRY(participant_->call<wire::CheckHealth>(std::move(request), Route{cell, {}, true}));
+  return participant_->accepted(reply);
 }
 
 Status Session::release(const std::string& cell, const std::string& batch_id, const ChangeOptions& change) {
@@ -114,33 +109,29 @@ Result<int> Session::activate(const std::string& cell, int version, const Change
   wire::ManageModelsRequest request;
   request.version(version);
   request.force(change.force);
-  const auto reply = participant_->manage(cell, wire::MANAGE_ACTIVATE, change, std::move(request));
-  if (!reply) return tl::make_unexpected(reply.error());
-  return reply->version();
+  const auto reply = TRY(participant_->manage(cell, wire::MANAGE_ACTIVATE, change, std::move(request)));
+  return reply.version();
 }
 
 Status Session::cancel(std::int64_t job) {
-  const auto found = participant_->find_job(job);
-  if (!found) return tl::make_unexpected(found.error());
+  const auto found = TRY(participant_->find_job(job));
   wire::ManageModelsRequest request;
   request.job(job);
-  return participant_->manage(found->second.cell(), wire::MANAGE_CANCEL_JOB, {}, std::move(request), found->first)
+  return participant_->manage(found.second.cell(), wire::MANAGE_CANCEL_JOB, {}, std::move(request), found.first)
       .map([](const auto&) {});
 }
 
 Result<int> Session::rollback(const std::string& cell, const ChangeOptions& change) {
-  const auto reply = participant_->manage(cell, wire::MANAGE_ROLLBACK, change);
-  if (!reply) return tl::make_unexpected(reply.error());
-  return reply->version();
+  const auto reply = TRY(participant_->manage(cell, wire::MANAGE_ROLLBACK, change));
+  return reply.version();
 }
 
 Result<int> Session::import_model(const std::string& cell, const std::string& text, const ChangeOptions& change) {
-  if (const Status fits = check_text("the model", text); !fits) return tl::make_unexpected(fits.error());
+  TRY(check_text("the model", text));
   wire::ManageModelsRequest request;
   request.model_text(text);
-  const auto reply = participant_->manage(cell, wire::MANAGE_IMPORT, change, std::move(request));
-  if (!reply) return tl::make_unexpected(reply.error());
-  return reply->version();
+  const auto reply = TRY(participant_->manage(cell, wire::MANAGE_IMPORT, change, std::move(request)));
+  return reply.version();
 }
 
 }  // namespace trammel::client

@@ -39,15 +39,13 @@ std::vector<BatchOfService> batches_in(const std::vector<wire::ReadModelsReply>&
 }  // namespace
 
 Result<DiagnosisAnswer> Session::diagnosis(const std::string& cell, std::int64_t job, bool page) {
-  const auto found = participant_->find_job(job, cell);
-  if (!found) return tl::make_unexpected(found.error());
+  const auto found = TRY(participant_->find_job(job, cell));
   wire::ReadModelsRequest request;
   request.job(job);
   request.page(page);
-  auto reply = participant_->read(cell, found->first, wire::READ_FINDINGS, std::move(request),
-                                  participant_->record_of(found->first));
-  if (!reply) return tl::make_unexpected(reply.error());
-  return DiagnosisAnswer{std::move(reply->text()), std::move(reply->page_html()), from_wire(reply->in_force())};
+  auto reply = TRY(participant_->read(cell, found.first, wire::READ_FINDINGS, std::move(request),
+                                      participant_->record_of(found.first)));
+  return DiagnosisAnswer{std::move(reply.text()), std::move(reply.page_html()), from_wire(reply.in_force())};
 }
 
 Result<std::vector<BatchOfService>> Session::quarantine(const std::string& cell) {
@@ -61,19 +59,17 @@ Result<std::vector<BatchOfService>> Session::batches(const std::string& cell) {
 Result<std::string> Session::export_batch(const std::string& cell, const std::string& batch_id) {
   wire::ReadModelsRequest request;
   request.batch_id(batch_id);
-  auto reply = participant_->read(cell, {}, wire::READ_BATCH, request);
-  if (!reply) return tl::make_unexpected(reply.error());
-  return std::move(reply->text());
+  auto reply = TRY(participant_->read(cell, {}, wire::READ_BATCH, request));
+  return std::move(reply.text());
 }
 
 Result<std::vector<DatedJob>> Session::jobs(const std::string& cell) {
-  const auto replies = participant_->read_all(cell, wire::READ_JOBS);
-  if (!replies) return tl::make_unexpected(replies.error());
+  const auto replies = TRY(participant_->read_all(cell, wire::READ_JOBS));
   std::vector<std::pair<wire::Job, std::string>> told;
-  for (const wire::ReadModelsReply& reply : *replies)
+  for (const wire::ReadModelsReply& reply : replies)
     add_new(told, reply.jobs(), reply.header().server().to_string(), is_same);
   // Who works on a job knows best how far it is.
-  for (const wire::ReadModelsReply& reply : *replies) {
+  for (const wire::ReadModelsReply& reply : replies) {
     for (const wire::Job& job : reply.jobs()) {
       if (job.server() != reply.header().server().to_string()) continue;
       for (auto& [known, server] : told) {
@@ -90,19 +86,17 @@ Result<std::vector<AuditText>> Session::audit(const std::string& cell, std::int6
   wire::ReadModelsRequest request;
   request.since_unix_s(since_unix_s);
   request.most(static_cast<std::uint32_t>(most));
-  const auto replies = participant_->read_all(cell, wire::READ_AUDIT, request);
-  if (!replies) return tl::make_unexpected(replies.error());
+  const auto replies = TRY(participant_->read_all(cell, wire::READ_AUDIT, request));
   std::vector<AuditText> texts;
-  for (const wire::ReadModelsReply& reply : *replies)
+  for (const wire::ReadModelsReply& reply : replies)
     texts.push_back({reply.header().server().to_string(), reply.text()});
   return texts;
 }
 
 Result<std::vector<std::string>> Session::fleet() {
-  const auto replies = participant_->read_all("", wire::READ_FLEET);
-  if (!replies) return tl::make_unexpected(replies.error());
+  const auto replies = TRY(participant_->read_all("", wire::READ_FLEET));
   std::vector<std::string> texts;
-  for (const wire::ReadModelsReply& reply : *replies) texts.push_back(reply.text());
+  for (const wire::ReadModelsReply& reply : replies) texts.push_back(reply.text());
   return texts;
 }
 
@@ -110,35 +104,31 @@ Result<std::vector<std::string>> Session::health(const std::string& cell, std::s
   wire::ReadModelsRequest request;
   request.since_unix_s(-1);
   request.most(static_cast<std::uint32_t>(most));
-  const auto replies = participant_->read_all(cell, wire::READ_HEALTH, request);
-  if (!replies) return tl::make_unexpected(replies.error());
+  const auto replies = TRY(participant_->read_all(cell, wire::READ_HEALTH, request));
   std::vector<std::string> texts;
-  for (const wire::ReadModelsReply& reply : *replies) texts.push_back(reply.text());
+  for (const wire::ReadModelsReply& reply : replies) texts.push_back(reply.text());
   return texts;
 }
 
 Result<std::vector<ModelInfo>> Session::models(const std::string& cell) {
-  const auto reply = participant_->read(cell, {}, wire::READ_MODELS);
-  if (!reply) return tl::make_unexpected(reply.error());
+  const auto reply = TRY(participant_->read(cell, {}, wire::READ_MODELS));
   std::vector<ModelInfo> models;
-  for (const wire::ModelInfo& model : reply->models()) models.push_back(from_wire(model));
+  for (const wire::ModelInfo& model : reply.models()) models.push_back(from_wire(model));
   return models;
 }
 
 Result<std::string> Session::export_model(const std::string& cell, int version) {
   wire::ReadModelsRequest request;
   request.version(version);
-  auto reply = participant_->read(cell, {}, wire::READ_MODEL, std::move(request));
-  if (!reply) return tl::make_unexpected(reply.error());
-  return std::move(reply->text());
+  auto reply = TRY(participant_->read(cell, {}, wire::READ_MODEL, std::move(request)));
+  return std::move(reply.text());
 }
 
 Result<std::string> Session::replay(const std::string& cell, int version) {
   wire::ReadModelsRequest request;
   request.version(version);
-  auto reply = participant_->read(cell, {}, wire::READ_REPLAY, std::move(request));
-  if (!reply) return tl::make_unexpected(reply.error());
-  return std::move(reply->text());
+  auto reply = TRY(participant_->read(cell, {}, wire::READ_REPLAY, std::move(request)));
+  return std::move(reply.text());
 }
 
 }  // namespace trammel::client

@@ -114,8 +114,7 @@ struct BiasModel::Fitted {
 };
 
 Result<std::shared_ptr<BiasModel::Fitted>> BiasModel::Fitted::from(const BiasState& state, VarianceForm form) {
-  if (const Status fine = check_observations(state.q, state.residual_B, state.sigma); !fine)
-    return tl::make_unexpected(fine.error());
+  TRY(check_observations(state.q, state.residual_B, state.sigma));
   if (state.kernel == kNone) {
     BiasState silent = state;
     silent.offset = VectorXd::Zero(kCoordinates);
@@ -123,9 +122,9 @@ Result<std::shared_ptr<BiasModel::Fitted>> BiasModel::Fitted::from(const BiasSta
   }
   auto bias = spelled_bias(state.kernel);
   if (!bias) return tl::make_unexpected(bias.error());
-  if (const Status fine = check_described(*bias, state); !fine) return tl::make_unexpected(fine.error());
+  TRY(check_described(*bias, state));
   bias = as_stored(*std::move(bias), state);
-  if (const Status fine = check_hyperparameters(state, *bias); !fine) return tl::make_unexpected(fine.error());
+  TRY(check_hyperparameters(state, *bias));
   const CoupledHyperparameters at = hyperparameters_of(state);
   const OutputData data = data_of(state);
   BiasOutputsPtr outputs = conditioned(*bias, data, at, form);
@@ -151,8 +150,7 @@ Result<BiasModel> BiasModel::refit(const BiasOptions& options) const {
 }
 
 Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOptions& options, const BiasState* last) {
-  if (const Status fine = check_observations(problem.q, problem.residual_B, problem.sigma); !fine)
-    return tl::make_unexpected(fine.error());
+  TRY(check_observations(problem.q, problem.residual_B, problem.sigma));
   BiasState state{options.kernel, problem.q, problem.residual_B, problem.sigma, VectorXd::Zero(kCoordinates), {}};
   if (options.kernel == kNone) return restore(state);
   auto bias = spelled_bias(options.kernel);
@@ -160,7 +158,7 @@ Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOpti
   if (options.starts < 1)
     return refused("bias fit: {} starts, at least 1", options.starts).of("starts").beyond(options.starts, 1);
   if (bias->needs_features()) state.features = problem.features;
-  if (const Status fine = check_described(*bias, state); !fine) return tl::make_unexpected(fine.error());
+  TRY(check_described(*bias, state));
   bias = last != nullptr ? as_stored(*std::move(bias), *last) : for_observations(*std::move(bias), problem.q.rows());
 
   state.offset = problem.residual_B.colwise().mean().transpose();
@@ -179,11 +177,10 @@ Result<BiasModel> BiasModel::fit_from(const BiasProblem& problem, const BiasOpti
   state.block_hyperparameters = found->found.blocks;
 
   // By the same way as a stored model, so that a restored one cannot differ.
-  const auto fitted = Fitted::from(state, VarianceForm::kLearned);
-  if (!fitted) return tl::make_unexpected(fitted.error());
-  (*fitted)->report.starts_at_best = found->starts_at_best;
-  (*fitted)->report.evaluations = found->evaluations;
-  return BiasModel(*fitted);
+  const auto fitted = TRY(Fitted::from(state, VarianceForm::kLearned));
+  fitted->report.starts_at_best = found->starts_at_best;
+  fitted->report.evaluations = found->evaluations;
+  return BiasModel(fitted);
 }
 
 Result<BiasModel> BiasModel::with(const BiasProblem& more) const {
@@ -207,8 +204,7 @@ Result<BiasModel> BiasModel::with(const BiasProblem& more) const {
   state.sigma.conservativeResize(n);
   state.sigma.tail(more.q.rows()) = more.sigma;
   state.features.insert(state.features.end(), more.features.begin(), more.features.end());
-  if (const Status fine = check_observations(state.q, state.residual_B, state.sigma); !fine)
-    return tl::make_unexpected(fine.error());
+  TRY(check_observations(state.q, state.residual_B, state.sigma));
   if (median(clipped(state.sigma)) != median(clipped(old.sigma))) return restore(state);
 
   const VectorXd shape = noise_shape(state.sigma).tail(more.q.rows());
@@ -240,8 +236,7 @@ Result<BiasModel> BiasModel::without(const std::vector<Index>& observations) con
     state.features.clear();
     for (const Index i : kept) state.features.push_back(old.features[static_cast<std::size_t>(i)]);
   }
-  if (const Status fine = check_observations(state.q, state.residual_B, state.sigma); !fine)
-    return tl::make_unexpected(fine.error());
+  TRY(check_observations(state.q, state.residual_B, state.sigma));
   if (median(clipped(state.sigma)) != median(clipped(old.sigma))) return restore(state);
   return regrown(std::move(state), fitted_->outputs->without(observations));
 }

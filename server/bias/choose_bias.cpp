@@ -115,10 +115,9 @@ Result<MatrixXd> missed(const BiasModel& model, const Fold& fold) {
   part.residual_B = fold.residual_B(fold.rest, Eigen::all);
   part.sigma = state.sigma(fold.rest);
   part.features = at(state.features, fold.rest);
-  const Result<BiasModel> rest = BiasModel::restore(part);
-  if (!rest) return tl::make_unexpected(rest.error());
+  const BiasModel rest = TRY(BiasModel::restore(part));
   return fold.residual_B(fold.block, Eigen::all) -
-         rest->mean_all_B(state.q(fold.block, Eigen::all), at(state.features, fold.block));
+         rest.mean_all_B(state.q(fold.block, Eigen::all), at(state.features, fold.block));
 }
 
 /// The same of all folds; `progress` is told the share done.
@@ -215,17 +214,17 @@ class Choosing {
     }
     ask_none();
     for (const char* kernel : kCheap) {
-      if (const Status asked = ask(kernel); !asked) return tl::make_unexpected(asked.error());
+      TRY(ask(kernel));
     }
     if (several_levers_) {
       for (const char* kernel : kAtFlange) {
-        if (const Status asked = ask(kernel); !asked) return tl::make_unexpected(asked.error());
+        TRY(ask(kernel));
       }
     }
     const double noise = std::sqrt(3 * problem_.sigma.squaredNorm() / static_cast<double>(problem_.sigma.size()));
     for (const char* kernel : kDear) {
       if (choice_.candidates[best_.candidate].leave_one_out_rms < kAboveNoise * noise) break;
-      if (const Status asked = ask(kernel); !asked) return tl::make_unexpected(asked.error());
+      TRY(ask(kernel));
     }
     return chosen();
   }
@@ -255,23 +254,20 @@ class Choosing {
       return !options_.progress || options_.progress((done + share) / most);
     };
     options.progress = [&](double share) { return report(kFitShare * share); };
-    Result<BiasModel> model = BiasModel::fit(problem_, options);
-    if (!model) return tl::make_unexpected(model.error());
-    const MatrixXd error = problem_.residual_B - model->leave_one_out_mean_B();
-    const VectorXd nlpd = negative_log_density_left_out(problem_, *model);
+    BiasModel model = TRY(BiasModel::fit(problem_, options));
+    const MatrixXd error = problem_.residual_B - model.leave_one_out_mean_B();
+    const VectorXd nlpd = negative_log_density_left_out(problem_, model);
     constexpr double kBoth = (1 - kFitShare) / 2;
-    const auto in_time = missed(*model, in_time_, [&](double share) { return report(kFitShare + kBoth * share); });
-    if (!in_time) return tl::make_unexpected(in_time.error());
+    const auto in_time = TRY(missed(model, in_time_, [&](double share) { return report(kFitShare + kBoth * share); }));
     const auto in_joint_space =
-        missed(*model, in_joint_space_, [&](double share) { return report(1 - kBoth + kBoth * share); });
-    if (!in_joint_space) return tl::make_unexpected(in_joint_space.error());
-    const Mean gain = gain_of(without_in_time_, *in_time);
-    const Mean far = gain_of(without_in_joint_space_, *in_joint_space);
+        TRY(missed(model, in_joint_space_, [&](double share) { return report(1 - kBoth + kBoth * share); }));
+    const Mean gain = gain_of(without_in_time_, in_time);
+    const Mean far = gain_of(without_in_joint_space_, in_joint_space);
     choice_.candidates.push_back(
-        {kernel, rms(error), nlpd.mean() / 3, rms(*in_time), rms(*in_joint_space), gain.value, gain.stddev, ""});
+        {kernel, rms(error), nlpd.mean() / 3, rms(in_time), rms(in_joint_space), gain.value, gain.stddev, ""});
     BiasCandidate& candidate = choice_.candidates.back();
 
-    const double hyperparameters = hyperparameters_of(*model);
+    const double hyperparameters = hyperparameters_of(model);
     const VectorXd of_poses = by_pose(poses_, nlpd);
     if (!clearly_likelier(of_poses, best_.nlpd, hyperparameters - best_.hyperparameters)) {
       candidate.verdict = fmt::format("not clearly better than {}", choice_.candidates[best_.candidate].kernel);
@@ -281,7 +277,7 @@ class Choosing {
     } else if (far.value < -kStandardErrors * far.stddev) {
       candidate.verdict = "harms where neighbours in joint space are left out";
     } else {
-      best_ = {choice_.candidates.size() - 1, of_poses, hyperparameters, std::move(*model)};
+      best_ = {choice_.candidates.size() - 1, of_poses, hyperparameters, std::move(model)};
     }
     return {};
   }
@@ -367,7 +363,7 @@ Result<ChosenBias> choose_bias(const BiasProblem& problem, const BiasOptions& op
                                const ResidualWithout& residual_without, Index most_coupled) {
   BiasOptions nothing = options;
   nothing.kernel = "none";
-  if (const Result<BiasModel> fine = BiasModel::fit(problem, nothing); !fine) return tl::make_unexpected(fine.error());
+  TRY(BiasModel::fit(problem, nothing));
   return Choosing(problem, options, residual_without, most_coupled).run();
 }
 

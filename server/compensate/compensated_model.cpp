@@ -81,8 +81,7 @@ Result<std::vector<BiasFeatures>> features_of(const ModelParts& parts, const Bia
   std::vector<BiasFeatures> features;
   for (std::size_t i = 0; i < parts.bias_contexts.size(); ++i) {
     PoseContext context = parts.bias_contexts[i];
-    if (const Status fine = check_context(context, bias.q.cols(), i + 1); !fine)
-      return tl::make_unexpected(fine.error());
+    TRY(check_context(context, bias.q.cols(), i + 1));
     context.q = bias.q.row(static_cast<Eigen::Index>(i)).transpose();
     const bool known_payload = context.payload.empty() || parts.physics.cell->payloads.contains(context.payload);
     if (!parts.physics.tools.contains(context.tool) || !known_payload) {
@@ -148,34 +147,30 @@ Status CompensatedModel::restore_biases(const Parts& parts, const BiasPhysics& t
   BiasState state = *parts.bias;
   const Result<SpelledBias> spelled = spelled_bias(state.kernel);
   if (spelled && spelled->needs_features()) {
-    Result<std::vector<BiasFeatures>> features = features_of(parts, then);
-    if (!features) return tl::make_unexpected(features.error());
-    state.features = std::move(*features);
+    std::vector<BiasFeatures> features = TRY(features_of(parts, then));
+    state.features = std::move(features);
     inside->bias_has_parameters = spelled->has("parameters");
   }
   if (parts.bias_origin) inside->bias_turn = then.turn_to(parts.physics);
   const auto turned_rms = [&](const Eigen::MatrixXd& residual_B) {
     return column_rms(inside->bias_turn ? residual_B * inside->bias_turn->transpose() : residual_B);
   };
-  Result<BiasModel> bias = BiasModel::restore(state);
-  if (!bias) return tl::make_unexpected(bias.error());
-  inside->bias = std::move(*bias);
+  BiasModel bias = TRY(BiasModel::restore(state));
+  inside->bias = std::move(bias);
   if (!inside->bias->has_blocks()) inside->bias_size_B = turned_rms(state.residual_B);
   if (!parts.rotation_bias) return {};
-  Result<BiasModel> rotation = restored_rotation(*parts.rotation_bias, state);
-  if (!rotation) return tl::make_unexpected(rotation.error());
+  BiasModel rotation = TRY(restored_rotation(*parts.rotation_bias, state));
   if (!inside->bias_has_parameters) inside->rotation_bias_size_B = turned_rms(parts.rotation_bias->residual_B);
-  inside->rotation_bias = std::move(*rotation);
+  inside->rotation_bias = std::move(rotation);
   return {};
 }
 
 Result<CompensatedModel> CompensatedModel::make(Parts parts) {
-  if (const Status fits = check_fit(parts); !fits) return tl::make_unexpected(fits.error());
+  TRY(check_fit(parts));
   const BiasPhysics then = physics_of_bias(parts);
   auto inside = std::make_shared<Inside>(parts.bias_origin ? then.with_tools_of(parts.physics) : then);
   if (parts.bias) {
-    if (const Status restored = restore_biases(parts, then, inside.get()); !restored)
-      return tl::make_unexpected(restored.error());
+    TRY(restore_biases(parts, then, inside.get()));
   }
   parts.provenance.hash = model_file::content_hash(parts);
   parts.provenance.id = parts.provenance.hash.substr(0, kIdLength);

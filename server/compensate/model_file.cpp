@@ -70,9 +70,8 @@ Status check_hash(const Members& members, const std::string& of, const std::stri
 
 /// Whether no byte was changed since the file was written. Looks at the bytes, before anything is made of them.
 Status check_undamaged(const Members& members, const std::string& where) {
-  const Result<int> format = format_of(members, where);
-  if (!format) return tl::make_unexpected(format.error());
-  Status fine = check_keys(members, *format, where);
+  const int format = TRY(format_of(members, where));
+  Status fine = check_keys(members, format, where);
   if (fine) fine = check_hash(members, "content", "hash", where);
   for (const char* part : {"stamp", "self_test"}) {
     const std::string by = fmt::format("{}_hash", part);
@@ -89,16 +88,15 @@ Status check_predictions(const CompensatedModel& model, const Members& members) 
 }
 
 Result<CompensatedModel> checked_model(const Members& members, const std::string& where, ModelTexts texts) {
-  if (const Status fine = check_undamaged(members, where); !fine) return tl::make_unexpected(fine.error());
+  TRY(check_undamaged(members, where));
   const Json content = Json::parse(members.at("content"));
   const Json stamp = Json::parse(members.at("stamp"));
   const Status can_be_told = texts == ModelTexts::kChecked ? model_file::check_texts(content, stamp) : Status();
   if (!can_be_told) return Failure(can_be_told.error()).in(where);
-  Result<ModelParts> parts = model_file::parts_from(content, stamp, where);
-  if (!parts) return tl::make_unexpected(parts.error());
-  const Status possible = model_file::check_parts(*parts);
+  ModelParts parts = TRY(model_file::parts_from(content, stamp, where));
+  const Status possible = model_file::check_parts(parts);
   Result<CompensatedModel> model =
-      possible ? CompensatedModel::make(std::move(*parts)) : tl::make_unexpected(possible.error());
+      possible ? CompensatedModel::make(std::move(parts)) : tl::make_unexpected(possible.error());
   if (model) {
     if (const Status same = check_predictions(*model, members); !same) model = tl::make_unexpected(same.error());
   }
@@ -138,7 +136,7 @@ Result<CompensatedModel> deserialize(const std::string& text, const std::string&
 
 Result<std::string> undamaged_hash(const std::string& text, const std::string& where) {
   return json_members(text, where).and_then([&](const Members& members) -> Result<std::string> {
-    if (const Status fine = check_undamaged(members, where); !fine) return tl::make_unexpected(fine.error());
+    TRY(check_undamaged(members, where));
     const std::string_view quoted = members.at("hash");
     return std::string(quoted.substr(1, quoted.size() - 2));
   });

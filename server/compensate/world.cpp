@@ -92,12 +92,11 @@ namespace {
 Status check_gauges(const CompensatedModel& model, const MeasurementBatch& batch) {
   if (!has_gauges(batch)) return {};
   if (has_sessions(batch)) return require_positions(batch, "placing several set-ups of the instrument");
-  const Result<Anchors> anchors = anchors_of(model.cell());
-  if (!anchors) return tl::make_unexpected(anchors.error());
+  const Anchors anchors = TRY(anchors_of(model.cell()));
   for (const Measurement& m : batch.measurements) {
     if (!m.gauge || placed_anchor(model.parts().physics, m.gauge->anchor).said != nullptr) continue;
-    const auto known = anchors->find(m.gauge->anchor);
-    if (known != anchors->end() && known->second.p_W) continue;
+    const auto known = anchors.find(m.gauge->anchor);
+    if (known != anchors.end() && known->second.p_W) continue;
     return refused("model {} does not know where anchor '{}' is", model.provenance().id, m.gauge->anchor)
         .in("batch " + batch.id)
         .at_row(m.row)
@@ -111,7 +110,7 @@ Status check_gauges(const CompensatedModel& model, const MeasurementBatch& batch
 }  // namespace
 
 Result<InWorld> in_world_of(const CompensatedModel& model, const MeasurementBatch& batch) {
-  if (const Status told = check_gauges(model, batch); !told) return tl::make_unexpected(told.error());
+  TRY(check_gauges(model, batch));
   if (has_gauges(batch)) return InWorld{batch};
   if (!has_sessions(batch)) return InWorld{of_one(model, batch)};
   std::vector<SessionSetting> settings = settings_of(batch);
@@ -127,9 +126,8 @@ Result<InWorld> in_world_of(const CompensatedModel& model, const MeasurementBatc
       index[s] = known->first;
       continue;
     }
-    const Result<Pose> X_WS = located(model, sessions[s]);
-    if (!X_WS) return tl::make_unexpected(X_WS.error());
-    settings[s].X_WS = *X_WS;
+    const Pose X_WS = TRY(located(model, sessions[s]));
+    settings[s].X_WS = X_WS;
     world.located.push_back(batch.sessions[s]);
   }
   world.batch = aligned(batch, settings, model.cell().tracker);

@@ -147,23 +147,22 @@ Status check_counts(const std::vector<std::string>& specs) {
 }  // namespace
 
 Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell, const std::vector<std::string>& specs) {
-  if (const Status few = check_counts(specs); !few) return tl::make_unexpected(few.error());
+  TRY(check_counts(specs));
   PhysicalModel model;
   std::size_t parameters = 0;
   for (const std::string& spec : spelled_out(specs, *cell)) {
-    Result<ErrorSourcePtr> source = make_error_source(spec, *cell);
-    if (!source) return tl::make_unexpected(source.error());
+    ErrorSourcePtr source = TRY(make_error_source(spec, *cell));
     for (const ErrorSourcePtr& other : model.sources) {
       const CauseRecord& cause = other->cause();
-      if (&cause == &(*source)->cause() && cause.forms.size() > 1) {
+      if (&cause == &source->cause() && cause.forms.size() > 1) {
         return failure(ErrorCode::kUsage, "error sources '{}' and '{}' are two forms of one cause", other->name(), spec)
             .of("error_sources")
             .with_text(spec);
       }
-      if (other->name() == (*source)->name())
+      if (other->name() == source->name())
         return failure(ErrorCode::kUsage, "error source '{}' given twice", spec).of("error_sources").with_text(spec);
     }
-    parameters += (*source)->parameters().size();
+    parameters += source->parameters().size();
     if (parameters > kMostParameters) {
       return failure(ErrorCode::kTooLarge, "error source '{}': {} parameters with those before it, limit {}", spec,
                      parameters, kMostParameters)
@@ -171,7 +170,7 @@ Result<PhysicalModel> make_physical_model(std::shared_ptr<const Cell> cell, cons
           .with_text(spec)
           .beyond(parameters, kMostParameters);
     }
-    model.sources.push_back(std::move(*source));
+    model.sources.push_back(std::move(source));
   }
   std::stable_sort(model.sources.begin(), model.sources.end(),
                    [](const ErrorSourcePtr& a, const ErrorSourcePtr& b) { return acts_before(*a, *b); });

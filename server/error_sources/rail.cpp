@@ -160,19 +160,19 @@ class RailStraightness final : public ErrorSource {
 };
 
 Result<ErrorSourcePtr> make_scale(const SourceSpec& spec, const Cell& cell) {
-  if (const Status rail = check_is_rail(spec, cell); !rail) return tl::make_unexpected(rail.error());
+  TRY(check_is_rail(spec, cell));
   return std::make_shared<RailScale>(spec);
 }
 
 Result<ErrorSourcePtr> make_pitch(const SourceSpec& spec, const Cell& cell) {
-  if (const Status rail = check_is_rail(spec, cell); !rail) return tl::make_unexpected(rail.error());
+  TRY(check_is_rail(spec, cell));
   if (spec.at.empty())
     return failure(ErrorCode::kUsage, "error source '{}': expected {}@mm, the pitch of the rack", spec.text, spec.text);
   return std::make_shared<RackPitch>(spec, travel_of(cell.robot.joint(spec.joint)));
 }
 
 Result<ErrorSourcePtr> make_straightness(const SourceSpec& spec, const Cell& cell) {
-  if (const Status rail = check_is_rail(spec, cell); !rail) return tl::make_unexpected(rail.error());
+  TRY(check_is_rail(spec, cell));
   return std::make_shared<RailStraightness>(spec, cell.robot.joint(spec.joint));
 }
 

@@ -228,7 +228,7 @@ std::uint64_t BoundedServer::shed() const { return running_->shed(); }
 
 Result<std::unique_ptr<BoundedServer>> BoundedServer::start(const std::string& address, std::uint16_t port,
                                                             const HttpLimits& limits, HttpHandler handler) {
-  if (const Status free = check_http_address(address, port); !free) return tl::make_unexpected(free.error());
+  TRY(check_http_address(address, port));
   auto running = std::make_unique<Running>(limits, std::move(handler));
   if (!running->bind_to_port(address, port))
     return failure(ErrorCode::kConflict, "{}:{} cannot be listened on", address, port).of("port").with_value(port);

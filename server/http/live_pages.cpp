@@ -142,12 +142,11 @@ std::string last_of(const std::vector<StoredJob>& jobs, JobKind kind) {
 
 /// Newest first.
 Result<std::string> job_table(const Watched& server, const std::string& cell) {
-  const auto jobs = server.store.recent_jobs(cell, kJobs);
-  if (!jobs) return tl::make_unexpected(jobs.error());
-  if (jobs->empty()) return std::string("<p>None.</p>");
+  const auto jobs = TRY(server.store.recent_jobs(cell, kJobs));
+  if (jobs.empty()) return std::string("<p>None.</p>");
   const Unfinished running = unfinished(server);
   std::vector<HtmlRow> rows;
-  for (auto job = jobs->rbegin(); job != jobs->rend(); ++job) {
+  for (auto job = jobs.rbegin(); job != jobs.rend(); ++job) {
     const auto now = progress_in(running, job->id);
     rows.push_back(
         {{html_link(job_address(job->id), std::to_string(job->id)), html_link(cell_address(job->cell), job->cell),
@@ -161,12 +160,11 @@ Result<std::string> job_table(const Watched& server, const std::string& cell) {
 }
 
 Result<std::string> version_table(const Watched& server, const std::string& cell) {
-  const auto versions = server.store.models(cell);
-  if (!versions) return tl::make_unexpected(versions.error());
-  if (versions->empty()) return std::string("<p>None yet.</p>");
+  const auto versions = TRY(server.store.models(cell));
+  if (versions.empty()) return std::string("<p>None yet.</p>");
   const int in_force = server.registry.version_in_force(cell);
   std::vector<HtmlRow> rows;
-  for (auto one = versions->rbegin(); one != versions->rend() && rows.size() < kMostVersions; ++one) {
+  for (auto one = versions.rbegin(); one != versions.rend() && rows.size() < kMostVersions; ++one) {
     const bool now = one->version == in_force;
     rows.push_back(
         {{html_link(model_address(cell, one->version), std::to_string(one->version)) + (now ? " in force" : ""),
@@ -179,10 +177,9 @@ Result<std::string> version_table(const Watched& server, const std::string& cell
 }
 
 Result<std::string> quarantine_table(const Watched& server, const std::string& cell) {
-  const auto batches = server.trainer.quarantined(cell);
-  if (!batches) return tl::make_unexpected(batches.error());
+  const auto batches = TRY(server.trainer.quarantined(cell));
   std::vector<HtmlRow> rows;
-  for (const StoredBatch& batch : *batches)
+  for (const StoredBatch& batch : batches)
     rows.push_back({{html_text(batch.id), std::to_string(batch.poses), html_time(batch.accepted_at),
                      html_text(batch.quarantine)}});
   return rows.empty() ? std::string() : table({"batch", "poses", "came (UTC)", "why it is kept out"}, rows);
@@ -257,7 +254,7 @@ ServicePage fleet_page(const Watched& server) {
 }
 
 Result<ServicePage> cell_page(const Watched& server, const std::string& cell) {
-  if (const Status known = check_served(server, cell); !known) return tl::make_unexpected(known.error());
+  TRY(check_served(server, cell));
   const CellReadiness now = readiness_of(server, cell);
   const std::string report =
       now.version == 0
@@ -277,53 +274,50 @@ Result<ServicePage> cell_page(const Watched& server, const std::string& cell) {
 }
 
 Result<ServicePage> jobs_page(const Watched& server) {
-  const auto jobs = job_table(server, "");
-  if (!jobs) return tl::make_unexpected(jobs.error());
-  return ServicePage{"Jobs", html_section("Newest first", *jobs), kLiveAgain};
+  const auto jobs = TRY(job_table(server, ""));
+  return ServicePage{"Jobs", html_section("Newest first", jobs), kLiveAgain};
 }
 
 Result<ServicePage> job_page(const Watched& server, std::int64_t id) {
-  const auto job = server.store.job(id);
-  if (!job) return tl::make_unexpected(job.error());
+  const auto job = TRY(server.store.job(id));
   const auto now = progress_in(unfinished(server), id);
-  std::vector<HtmlRow> rows = {{{"cell", html_link(cell_address(job->cell), job->cell)}},
-                               {{"what", kind_of(job->kind)}},
-                               {{"batches", batches_of(*job)}},
-                               {{"asked (UTC)", html_time(job->created_at)}},
-                               {{"begun (UTC)", html_time(job->started_at)}},
-                               {{"ended (UTC)", html_time(job->finished_at)}},
-                               {{"server", job->server.empty() ? "–" : html_text(job->server)}},
-                               {{"outcome", outcome_of(*job, now)}}};
-  const JobOutcome& outcome = job->outcome;
+  std::vector<HtmlRow> rows = {{{"cell", html_link(cell_address(job.cell), job.cell)}},
+                               {{"what", kind_of(job.kind)}},
+                               {{"batches", batches_of(job)}},
+                               {{"asked (UTC)", html_time(job.created_at)}},
+                               {{"begun (UTC)", html_time(job.started_at)}},
+                               {{"ended (UTC)", html_time(job.finished_at)}},
+                               {{"server", job.server.empty() ? "–" : html_text(job.server)}},
+                               {{"outcome", outcome_of(job, now)}}};
+  const JobOutcome& outcome = job.outcome;
   if (outcome.before || outcome.after)
     rows.push_back({{"held-out rms, mm", fmt::format("before {}, after {}, limit {}", millimetres(outcome.before),
                                                      millimetres(outcome.after), millimetres(outcome.limit))}});
   if (!outcome.next.empty()) rows.push_back({{"next", html_text(outcome.next)}});
-  if (job->model_version > 0)
-    rows.push_back({{"model", html_link(model_address(job->cell, job->model_version),
-                                        fmt::format("version {}", job->model_version))}});
-  if (job->kind != JobKind::kTrain && !now)
+  if (job.model_version > 0)
+    rows.push_back({{"model", html_link(model_address(job.cell, job.model_version),
+                                        fmt::format("version {}", job.model_version))}});
+  if (job.kind != JobKind::kTrain && !now)
     rows.push_back({{"found", html_link(job_address(id) + "/findings", "what it found")}});
   return ServicePage{fmt::format("Job {}", id), html_section("What became of it", html_table({"", {}, rows})),
                      now ? kLiveAgain : 0};
 }
 
 Result<std::string> model_report(const Watched& server, const std::string& cell, int version) {
-  if (const Status known = check_served(server, cell); !known) return tl::make_unexpected(known.error());
+  TRY(check_served(server, cell));
   return model_of(server, cell, version).map([](const CompensatedModel& model) {
     return model_page(model, std::nullopt);
   });
 }
 
 Result<std::string> history_report(const Watched& server, const std::string& cell) {
-  if (const Status known = check_served(server, cell); !known) return tl::make_unexpected(known.error());
-  const auto versions = server.store.models(cell);
-  if (!versions) return tl::make_unexpected(versions.error());
+  TRY(check_served(server, cell));
+  const auto versions = TRY(server.store.models(cell));
   CellHistory history{cell};
   const int in_force = server.registry.version_in_force(cell);
-  const std::size_t skipped = versions->size() - std::min(versions->size(), kHistoryVersions);
-  for (std::size_t i = skipped; i < versions->size(); ++i) {
-    const StoredModel& stored = (*versions)[i];
+  const std::size_t skipped = versions.size() - std::min(versions.size(), kHistoryVersions);
+  for (std::size_t i = skipped; i < versions.size(); ++i) {
+    const StoredModel& stored = versions[i];
     VersionOnRecord one{stored.version,
                         stored.id,
                         stored.batch_id,

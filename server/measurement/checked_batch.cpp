@@ -35,8 +35,7 @@ void rebase_times(std::vector<Measurement>& measurements) {
 }
 
 Status check_poses(MeasurementBatch& batch, const Cell& cell, const std::string& where) {
-  const Result<Anchors> anchors = anchors_of(cell);
-  if (!anchors) return tl::make_unexpected(anchors.error());
+  const Anchors anchors = TRY(anchors_of(cell));
   for (Measurement& measurement : batch.measurements) {
     if (measurement.context.q.size() != cell.robot.size()) {
       return refused("{} joints, robot {} has {}", measurement.context.q.size(), cell.robot.name(), cell.robot.size())
@@ -46,7 +45,7 @@ Status check_poses(MeasurementBatch& batch, const Cell& cell, const std::string&
     }
     const Status pose = check_pose(measurement.context, cell);
     if (!pose) return Failure(pose.error()).in(where).at_row(measurement.row);
-    const Status gauge = check_gauge(measurement, cell, *anchors);
+    const Status gauge = check_gauge(measurement, cell, anchors);
     if (!gauge) return Failure(gauge.error()).in(where).at_row(measurement.row);
   }
   return {};
@@ -198,9 +197,7 @@ Result<CheckedBatch> check_against_cell(MeasurementBatch batch, const Cell& cell
   if (batch.source_text.empty()) batch.source_text = to_csv(batch);
   std::string hash = batch_hash(batch);
   if (batch.joint_types.empty()) batch.joint_types = joint_types(cell.robot);
-  if (const Status columns = check_joint_columns(batch.joint_types, cell.robot, where); !columns) {
-    return tl::make_unexpected(columns.error());
-  }
+  TRY(check_joint_columns(batch.joint_types, cell.robot, where));
   divide_into_sessions(batch);
   rebase_times(batch.measurements);
   const auto with_reading = [&](const Error& why) {

@@ -66,9 +66,8 @@ Status require_positions(const MeasurementBatch& batch, const std::string& who) 
 Status check_gauge(Measurement& measurement, const Cell& cell, const Anchors& anchors) {
   if (!measurement.gauge) return {};
   Gauge& gauge = *measurement.gauge;
-  Result<std::string> id = resolved(gauge.anchor, cell, anchors);
-  if (!id) return tl::make_unexpected(id.error());
-  gauge.anchor = std::move(*id);
+  std::string id = TRY(resolved(gauge.anchor, cell, anchors));
+  gauge.anchor = std::move(id);
   const Anchor& anchor = anchors.at(gauge.anchor);
   if (gauge.kind == Gauge::Kind::kTouch && anchor.shape == Anchor::Shape::kPoint) {
     return refused("touch_mm of anchor '{}', which is a point", gauge.anchor)

@@ -65,9 +65,8 @@ Result<PoseColumns> PoseColumns::find(const CsvTable& table) {
   // Targets on a branch have no joints of their own, but a way to come there.
   for (int n = 1; joints.empty() && table.find(fmt::format("dir{}", n)); ++n)
     direction_names.push_back(fmt::format("dir{}", n));
-  Result<std::vector<std::size_t>> directions = table.all_or_none(direction_names);
-  if (!directions) return tl::make_unexpected(directions.error());
-  found.directions_ = std::move(*directions);
+  std::vector<std::size_t> directions = TRY(table.all_or_none(direction_names));
+  found.directions_ = std::move(directions);
   found.time_ = table.find("time_s");
   found.temperature_ = table.find("temperature_c");
   found.tool_ = table.find("tool_id");
@@ -84,9 +83,8 @@ Status PoseColumns::require_joints(const CsvTable& table) const {
 Result<JointVector> PoseColumns::joints(const CsvTable& table, std::size_t row) const {
   JointVector q(static_cast<Eigen::Index>(joints_.size()));
   for (std::size_t j = 0; j < joints_.size(); ++j) {
-    const Result<double> value = table.number(row, joints_[j]);
-    if (!value) return tl::make_unexpected(value.error());
-    q(static_cast<Eigen::Index>(j)) = joint_types_[j] == JointType::kRevolute ? from_deg(*value) : from_mm(*value);
+    const double value = TRY(table.number(row, joints_[j]));
+    q(static_cast<Eigen::Index>(j)) = joint_types_[j] == JointType::kRevolute ? from_deg(value) : from_mm(value);
   }
   return q;
 }
@@ -98,32 +96,27 @@ bool PoseColumns::joints_empty(const CsvTable& table, std::size_t row) const {
 
 Result<PoseContext> PoseColumns::circumstances(const CsvTable& table, std::size_t row) const {
   PoseContext context;
-  const auto time = optional_number(table, row, time_, kTimeLimit);
-  if (!time) return tl::make_unexpected(time.error());
-  const auto temperature = optional_number(table, row, temperature_, kTemperatureLimit);
-  if (!temperature) return tl::make_unexpected(temperature.error());
-  context.time = *time;
-  context.temperature = *temperature;
+  const auto time = TRY(optional_number(table, row, time_, kTimeLimit));
+  const auto temperature = TRY(optional_number(table, row, temperature_, kTemperatureLimit));
+  context.time = time;
+  context.temperature = temperature;
   for (const std::size_t column : directions_) {
-    const Result<int> direction = table.field(row, column).empty() ? 0 : table.integer(row, column, -1, 1);
-    if (!direction) return tl::make_unexpected(direction.error());
-    context.direction.push_back(*direction);
+    const int direction = TRY(table.field(row, column).empty() ? 0 : table.integer(row, column, -1, 1));
+    context.direction.push_back(direction);
   }
   context.index = static_cast<int>(row);
   for (const auto& [column, text] : {std::pair(tool_, &context.tool), std::pair(payload_, &context.payload)}) {
     if (!column) continue;
-    Result<std::string> name = table.name(row, *column);
-    if (!name) return tl::make_unexpected(name.error());
-    *text = std::move(*name);
+    std::string name = TRY(table.name(row, *column));
+    *text = std::move(name);
   }
   return context;
 }
 
 Result<PoseContext> PoseColumns::read(const CsvTable& table, std::size_t row) const {
-  Result<JointVector> q = joints(table, row);
-  if (!q) return tl::make_unexpected(q.error());
+  JointVector q = TRY(joints(table, row));
   return circumstances(table, row).map([&](PoseContext context) {
-    context.q = std::move(*q);
+    context.q = std::move(q);
     return context;
   });
 }

@@ -37,9 +37,8 @@ Result<Plan> plan_of(const Cell& cell, const JointList& list) {
   Plan plan;
   for (const CommandedPose& given : list.poses) {
     const auto number = static_cast<int>(plan.poses.size());
-    Result<PlannedPose> pose = planned_pose(cell.robot, given, number, list.where);
-    if (!pose) return tl::make_unexpected(pose.error());
-    plan.poses.push_back(std::move(*pose));
+    PlannedPose pose = TRY(planned_pose(cell.robot, given, number, list.where));
+    plan.poses.push_back(std::move(pose));
   }
   plan.draw.drawn = plan.draw.kept = static_cast<int>(plan.poses.size());
   return plan;

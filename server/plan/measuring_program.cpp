@@ -157,8 +157,7 @@ std::string script_motion(const Axes& axes, const JointVector& q, double speed) 
 }  // namespace
 
 Result<std::string> to_rapid(const Chain& robot, const Plan& plan, const ProgramOptions& options) {
-  const Result<Axes> axes = axes_of(robot, options);
-  if (!axes) return tl::make_unexpected(axes.error());
+  const Axes axes = TRY(axes_of(robot, options));
   if (!is_name(options.rapid_tool, kRapidName)) {
     return refused("RAPID tool '{}': expected a letter, then letters, digits or '_', {} at most", options.rapid_tool,
                    kRapidName)
@@ -171,8 +170,8 @@ Result<std::string> to_rapid(const Chain& robot, const Plan& plan, const Program
   text += "  CONST speeddata trammel_fast:=[200,20,200,20];\n";
   text += "  CONST speeddata trammel_slow:=[20,2,20,2];\n";
   for (std::size_t i = 0; i < plan.poses.size(); ++i) {
-    text += rapid_target(fmt::format("trammel_b{}", i + 1), *axes, plan.poses[i].bump);
-    text += rapid_target(fmt::format("trammel_p{}", i + 1), *axes, plan.poses[i].context.q);
+    text += rapid_target(fmt::format("trammel_b{}", i + 1), axes, plan.poses[i].bump);
+    text += rapid_target(fmt::format("trammel_p{}", i + 1), axes, plan.poses[i].context.q);
   }
   text += "\n  PROC trammel_measure()\n";
   for (std::size_t i = 0; i < plan.poses.size(); ++i) {
@@ -188,8 +187,7 @@ Result<std::string> to_rapid(const Chain& robot, const Plan& plan, const Program
 }
 
 Result<std::string> to_krl(const Chain& robot, const Plan& plan, const ProgramOptions& options) {
-  const Result<Axes> axes = axes_of(robot, options);
-  if (!axes) return tl::make_unexpected(axes.error());
+  const Axes axes = TRY(axes_of(robot, options));
   if (options.krl_tool < 0 || options.krl_tool > kKrlTools) {
     return refused("KRL tool {}: expected 0 to {}", options.krl_tool, kKrlTools)
         .of("krl_tool")
@@ -215,16 +213,15 @@ Result<std::string> to_krl(const Chain& robot, const Plan& plan, const ProgramOp
       text += "  " + comment(";", change) + "\n  HALT\n";
     }
     text += "  " + comment(";", "pose " + plan.poses[i].id) + "\n";
-    text += "  BAS (#VEL_PTP,20)\n" + krl_motion(*axes, plan.poses[i].bump);
-    text += "  BAS (#VEL_PTP,2)\n" + krl_motion(*axes, plan.poses[i].context.q);
+    text += "  BAS (#VEL_PTP,20)\n" + krl_motion(axes, plan.poses[i].bump);
+    text += "  BAS (#VEL_PTP,2)\n" + krl_motion(axes, plan.poses[i].context.q);
     text += "  WAIT SEC TRAMMEL_WAIT\n";
   }
   return text + "END\n";
 }
 
 Result<std::string> to_fanuc(const Chain& robot, const Plan& plan, const ProgramOptions& options) {
-  const Result<Axes> axes = axes_of(robot, options);
-  if (!axes) return tl::make_unexpected(axes.error());
+  const Axes axes = TRY(axes_of(robot, options));
   if (options.fanuc_tool < 1 || options.fanuc_tool > kFanucTools) {
     return refused("FANUC tool {}: expected 1 to {}", options.fanuc_tool, kFanucTools)
         .of("fanuc_tool")
@@ -236,7 +233,7 @@ Result<std::string> to_fanuc(const Chain& robot, const Plan& plan, const Program
         .of("program")
         .with_text(options.name);
   }
-  FanucText text(*axes, options.fanuc_tool);
+  FanucText text(axes, options.fanuc_tool);
   text.remark(fmt::format("{} poses for {}", plan.poses.size(), robot.name()));
   text.line("UFRAME_NUM=0");
   text.line(fmt::format("UTOOL_NUM={}", options.fanuc_tool));
@@ -254,11 +251,10 @@ Result<std::string> to_fanuc(const Chain& robot, const Plan& plan, const Program
 }
 
 Result<std::string> to_urscript(const Chain& robot, const Plan& plan, const ProgramOptions& options) {
-  const Result<Axes> axes = axes_of(robot, options);
-  if (!axes) return tl::make_unexpected(axes.error());
-  if (axes->rail)
-    return refused("robot {}: joint {} is prismatic, a script moves six turning joints", robot.name(), *axes->rail + 1)
-        .of(fmt::format("joint {}", *axes->rail + 1));
+  const Axes axes = TRY(axes_of(robot, options));
+  if (axes.rail)
+    return refused("robot {}: joint {} is prismatic, a script moves six turning joints", robot.name(), *axes.rail + 1)
+        .of(fmt::format("joint {}", *axes.rail + 1));
   constexpr double kFast = 0.35, kSlow = 0.035;  // rad/s
   const std::string name = module_name(options.name);
   std::string text = fmt::format("def {}():\n  {}\n", name,
@@ -268,8 +264,8 @@ Result<std::string> to_urscript(const Chain& robot, const Plan& plan, const Prog
       text += fmt::format("  popup(\"{}\", blocking=True)\n", comment("", change).substr(1));
     }
     text += "  " + comment("#", "pose " + plan.poses[i].id) + "\n";
-    text += script_motion(*axes, plan.poses[i].bump, kFast);
-    text += script_motion(*axes, plan.poses[i].context.q, kSlow);
+    text += script_motion(axes, plan.poses[i].bump, kFast);
+    text += script_motion(axes, plan.poses[i].context.q, kSlow);
     text += fmt::format("  sleep({:g})\n", options.wait_s);
   }
   return text + fmt::format("end\n{}()\n", name);

@@ -60,9 +60,8 @@ class Filter {
     Filter filter(cell);
     for (const std::string& tool : tools) {
       filter.X_FT_.push_back(cell.tools.at(tool).value_or(Pose::Identity()));
-      Result<Visibility> visibility = Visibility::of(cell, tool);
-      if (!visibility) return tl::make_unexpected(visibility.error());
-      filter.visibility_.push_back(std::move(*visibility));
+      Visibility visibility = TRY(Visibility::of(cell, tool));
+      filter.visibility_.push_back(std::move(visibility));
     }
     return filter;
   }
@@ -112,12 +111,11 @@ struct Drawn {
 template <typename Prepare, typename WaysOf>
 Result<Drawn> draw(const Cell& cell, const Filter& filter, int wanted, int needed, int largest_factor,
                    std::uint64_t seed, const Prepare& prepare, const WaysOf& ways_of) {
-  const Result<JointRanges> ranges = planning_ranges(cell);
-  if (!ranges) return tl::make_unexpected(ranges.error());
+  const JointRanges ranges = TRY(planning_ranges(cell));
   Drawn drawn;
   for (int factor = 1; factor <= largest_factor && static_cast<int>(drawn.q.size()) < wanted; factor *= 2) {
     drawn = {};
-    const Eigen::MatrixXd candidates = latin_hypercube(*ranges, wanted * factor, seed);
+    const Eigen::MatrixXd candidates = latin_hypercube(ranges, wanted * factor, seed);
     for (Eigen::Index i = 0; i < candidates.rows(); ++i) {
       JointVector q = candidates.row(i).transpose();
       if (cell.robot.joint_outside_limits(q)) {
@@ -168,9 +166,8 @@ Result<std::vector<std::string>> resolved(const Cell& cell, const std::vector<st
                                           Result<std::string> (*resolve)(const Cell&, const std::string&)) {
   std::vector<std::string> names;
   for (const std::string& name : asked.empty() ? std::vector<std::string>{""} : asked) {
-    const Result<std::string> known = resolve(cell, name);
-    if (!known) return tl::make_unexpected(known.error());
-    names.push_back(*known);
+    const std::string known = TRY(resolve(cell, name));
+    names.push_back(known);
   }
   return names;
 }
@@ -230,12 +227,11 @@ Result<CausePair> pair_of(const Planning& planning, const PlanOptions& options) 
   if (options.criterion == PlanCriterion::kSeparation) {
     return make_cause_pair(planning.cell, options.cause, options.other);
   }
-  Result<PhysicalModel> model = make_physical_model(planning.cell, planning.cell->model.error_sources);
-  if (!model) return tl::make_unexpected(model.error());
-  if (model->parameter_count() == 0)
+  PhysicalModel model = TRY(make_physical_model(planning.cell, planning.cell->model.error_sources));
+  if (model.parameter_count() == 0)
     return refused("cell {}: its model has no error sources", planning.cell->name).of("error_sources");
-  model->values = planning_values(*model);
-  return CausePair{std::move(*model), "", "", {}, {}};
+  model.values = planning_values(model);
+  return CausePair{std::move(model), "", "", {}, {}};
 }
 
 Plan::Separation separation_of(const CausePair& pair, const Separability& plan, const Separability& latin_hypercube,
@@ -256,28 +252,26 @@ Plan::Separation separation_of(const CausePair& pair, const Separability& plan, 
 /// Chooses among `candidates`, and compares with `latin_hypercube`.
 Result<Plan> designed(const Planning& planning, const PlanOptions& options, const Filter& filter,
                       const Drawn& candidates, const Drawn& latin_hypercube) {
-  const Result<CausePair> pair = pair_of(planning, options);
-  if (!pair) return tl::make_unexpected(pair.error());
+  const CausePair pair = TRY(pair_of(planning, options));
   const int ways = planning.twice ? 2 : 1;
   const std::vector<PoseContext> contexts = contexts_of(planning, candidates.q);
-  const DesignCandidates rows = design_candidates(pair->model, contexts, options.orientation, ways);
+  const DesignCandidates rows = design_candidates(pair.model, contexts, options.orientation, ways);
   const Eigen::Index P = rows.rows.cols();
   const Eigen::MatrixXd prior = Eigen::MatrixXd::Identity(P, P);
-  const Result<Design> design = optimal_design(rows, prior, options.count, pair->rest);
-  if (!design) return tl::make_unexpected(design.error());
+  const Design design = TRY(optimal_design(rows, prior, options.count, pair.rest));
 
   std::vector<PoseContext> chosen;
-  for (const std::size_t i : design->chosen) {
+  for (const std::size_t i : design.chosen) {
     const auto first = contexts.begin() + static_cast<std::ptrdiff_t>(i) * ways;
     chosen.insert(chosen.end(), first, first + ways);
   }
   come_in_turn(planning, filter, chosen);
   const auto information = [&](const std::vector<PoseContext>& poses) {
-    return information_of(pair->model, poses, options.orientation);
+    return information_of(pair.model, poses, options.orientation);
   };
   const auto criterion = [&](const Eigen::MatrixXd& told) {
     const Eigen::MatrixXd known = prior + told;
-    return log_det(known) - (pair->rest.empty() ? 0 : log_det(known(pair->rest, pair->rest)));
+    return log_det(known) - (pair.rest.empty() ? 0 : log_det(known(pair.rest, pair.rest)));
   };
   const Eigen::MatrixXd of_plan = information(chosen);
   const Eigen::MatrixXd evenly = information(contexts_of(planning, latin_hypercube.q));
@@ -286,8 +280,8 @@ Result<Plan> designed(const Planning& planning, const PlanOptions& options, cons
   plan.criterion = criterion(of_plan);
   plan.criterion_of_latin_hypercube = criterion(evenly);
   if (options.criterion == PlanCriterion::kSeparation) {
-    const auto told = [&](const Eigen::MatrixXd& known) { return separability(*pair, known); };
-    plan.separation = separation_of(*pair, told(of_plan), told(evenly), told(rows.rows.transpose() * rows.rows));
+    const auto told = [&](const Eigen::MatrixXd& known) { return separability(pair, known); };
+    plan.separation = separation_of(pair, told(of_plan), told(evenly), told(rows.rows.transpose() * rows.rows));
   }
   plan.poses = planned(planning, std::move(chosen));
   return plan;
@@ -296,10 +290,9 @@ Result<Plan> designed(const Planning& planning, const PlanOptions& options, cons
 /// Chooses among `candidates`, which also stand for the poses that the cell works at.
 Result<Plan> planned_check(const Planning& planning, const PlanOptions& options, const Filter& filter,
                            const Drawn& candidates) {
-  const Result<CausePair> pair = pair_of(planning, options);
-  if (!pair) return tl::make_unexpected(pair.error());
+  const CausePair pair = TRY(pair_of(planning, options));
   const std::vector<PoseContext> contexts = contexts_of(planning, candidates.q);
-  const CauseEffects effects(pair->model, contexts);
+  const CauseEffects effects(pair.model, contexts);
   const auto working = std::min(contexts.size(), static_cast<std::size_t>(kWorkingPoses));
   const WorkingPoses work(effects, {contexts.begin(), contexts.begin() + static_cast<std::ptrdiff_t>(working)}, false);
   CheckTest test;
@@ -307,10 +300,9 @@ Result<Plan> planned_check(const Planning& planning, const PlanOptions& options,
   test.sigma_rotation = planning.cell->tracker.sigma_rotation;
   test.orientation = options.orientation;
   const std::vector<CauseSignal> signals = work.signals(effects, options.seed);
-  const Result<CheckDesign> design = check_design(effects, signals, contexts, options.count, test);
-  if (!design) return tl::make_unexpected(design.error());
+  const CheckDesign design = TRY(check_design(effects, signals, contexts, options.count, test));
   std::vector<PoseContext> chosen;
-  for (const std::size_t i : design->chosen) chosen.push_back(contexts[i]);
+  for (const std::size_t i : design.chosen) chosen.push_back(contexts[i]);
   come_in_turn(planning, filter, chosen);
   Plan plan;
   plan.draw = candidates.count;
@@ -322,35 +314,31 @@ Result<Plan> planned_check(const Planning& planning, const PlanOptions& options,
 }  // namespace
 
 Result<Eigen::MatrixXd> plan_poses(const Cell& cell, const PlanOptions& options) {
-  if (const Status counted = check_count(options); !counted) return tl::make_unexpected(counted.error());
-  const Result<Filter> filter = Filter::of(cell, {cell.tools.begin()->first});
-  if (!filter) return tl::make_unexpected(filter.error());
-  const Result<Drawn> drawn = draw(
-      cell, *filter, options.count, options.count, kLargestFactor, options.seed, [](JointVector q) { return q; },
-      [](const JointVector&, std::size_t) { return std::vector<Sides>(); });
-  if (!drawn) return tl::make_unexpected(drawn.error());
+  TRY(check_count(options));
+  const Filter filter = TRY(Filter::of(cell, {cell.tools.begin()->first}));
+  const Drawn drawn = TRY(draw(
+      cell, filter, options.count, options.count, kLargestFactor, options.seed, [](JointVector q) { return q; },
+      [](const JointVector&, std::size_t) { return std::vector<Sides>(); }));
   Eigen::MatrixXd q(options.count, cell.robot.size());
-  for (Eigen::Index i = 0; i < q.rows(); ++i) q.row(i) = drawn->q[static_cast<std::size_t>(i)].transpose();
+  for (Eigen::Index i = 0; i < q.rows(); ++i) q.row(i) = drawn.q[static_cast<std::size_t>(i)].transpose();
   return q;
 }
 
 Result<std::vector<bool>> plannable(const Cell& cell, const Eigen::MatrixXd& q) {
-  const Result<Filter> filter = Filter::of(cell, {cell.tools.begin()->first});
-  if (!filter) return tl::make_unexpected(filter.error());
-  const Result<JointRanges> ranges = planning_ranges(cell);
-  if (!ranges) return tl::make_unexpected(ranges.error());
+  const Filter filter = TRY(Filter::of(cell, {cell.tools.begin()->first}));
+  const JointRanges ranges = TRY(planning_ranges(cell));
   DrawCount count;
   std::vector<bool> may(static_cast<std::size_t>(q.rows()), true);
   for (Eigen::Index i = 0; i < q.rows(); ++i) {
     const JointVector one = q.row(i).transpose();
     bool inside = !cell.robot.joint_outside_limits(one);
-    for (std::size_t j = 0; j < ranges->size(); ++j) {
+    for (std::size_t j = 0; j < ranges.size(); ++j) {
       const double at = one(static_cast<Eigen::Index>(j));
-      inside = inside && at >= (*ranges)[j].first && at <= (*ranges)[j].second;
+      inside = inside && at >= ranges[j].first && at <= ranges[j].second;
     }
     const auto comes = [&](int side) {
       const Sides sides = possible_sides(cell.robot, one, Sides(static_cast<std::size_t>(one.size()), side));
-      return filter->keeps(one, {sides}, count);
+      return filter.keeps(one, {sides}, count);
     };
     may[static_cast<std::size_t>(i)] = inside && (comes(-1) || comes(1));
   }
@@ -358,34 +346,29 @@ Result<std::vector<bool>> plannable(const Cell& cell, const Eigen::MatrixXd& q) 
 }
 
 Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell, const PlanOptions& options) {
-  if (const Status counted = check_count(options); !counted) return tl::make_unexpected(counted.error());
+  TRY(check_count(options));
   if (options.criterion == PlanCriterion::kCheck && options.bidirectional) {
     return failure(ErrorCode::kUsage, "a check takes each pose once").of("--bidirectional");
   }
-  const auto tools = resolved(*cell, options.tools, resolve_tool);
-  if (!tools) return tl::make_unexpected(tools.error());
-  const auto payloads = resolved(*cell, options.payloads, resolve_payload);
-  if (!payloads) return tl::make_unexpected(payloads.error());
-  const Planning planning{cell, *tools, *payloads, options.bidirectional};
-  const Result<Filter> filter = Filter::of(*cell, planning.tools);
-  if (!filter) return tl::make_unexpected(filter.error());
+  const auto tools = TRY(resolved(*cell, options.tools, resolve_tool));
+  const auto payloads = TRY(resolved(*cell, options.payloads, resolve_payload));
+  const Planning planning{cell, tools, payloads, options.bidirectional};
+  const Filter filter = TRY(Filter::of(*cell, planning.tools));
   const auto drawn = [&](int wanted, int largest_factor) {
     return draw(
-        *cell, *filter, wanted, options.count, largest_factor, options.seed,
+        *cell, filter, wanted, options.count, largest_factor, options.seed,
         [&](JointVector q) { return on_program_grid(cell->robot, std::move(q)); },
         [&](const JointVector& q, std::size_t number) { return planning.ways(q, number); });
   };
-  const Result<Drawn> latin_hypercube = drawn(options.count, kLargestFactor);
-  if (!latin_hypercube) return tl::make_unexpected(latin_hypercube.error());
+  const Drawn latin_hypercube = TRY(drawn(options.count, kLargestFactor));
   if (options.criterion == PlanCriterion::kLatinHypercube) {
-    return Plan{planned(planning, contexts_of(planning, latin_hypercube->q)), latin_hypercube->count, 0, 0, {}, {}};
+    return Plan{planned(planning, contexts_of(planning, latin_hypercube.q)), latin_hypercube.count, 0, 0, {}, {}};
   }
   const bool check = options.criterion == PlanCriterion::kCheck;
-  const Result<Drawn> candidates = drawn(
-      std::max(check ? kCheckCandidates : kCandidates, kCandidatesForEachPose * options.count), kLargestDesignFactor);
-  if (!candidates) return tl::make_unexpected(candidates.error());
-  if (check) return planned_check(planning, options, *filter, *candidates);
-  return designed(planning, options, *filter, *candidates, *latin_hypercube);
+  const Drawn candidates = TRY(drawn(
+      std::max(check ? kCheckCandidates : kCandidates, kCandidatesForEachPose * options.count), kLargestDesignFactor));
+  if (check) return planned_check(planning, options, filter, candidates);
+  return designed(planning, options, filter, candidates, latin_hypercube);
 }
 
 }  // namespace trammel

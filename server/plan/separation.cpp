@@ -9,11 +9,9 @@ namespace trammel {
 
 Result<CausePair> make_cause_pair(const std::shared_ptr<const Cell>& cell, const std::string& cause,
                                   const std::string& other) {
-  const Result<ErrorSourcePtr> first = make_error_source(cause, *cell);
-  if (!first) return tl::make_unexpected(first.error());
-  const Result<ErrorSourcePtr> second = make_error_source(other, *cell);
-  if (!second) return tl::make_unexpected(second.error());
-  if ((*first)->name() == (*second)->name()) {
+  const ErrorSourcePtr first = TRY(make_error_source(cause, *cell));
+  const ErrorSourcePtr second = TRY(make_error_source(other, *cell));
+  if (first->name() == second->name()) {
     return failure(ErrorCode::kUsage, "'{}' and '{}' are the same cause", cause, other)
         .of("--criterion")
         .with_text(cause);
@@ -27,13 +25,12 @@ Result<CausePair> make_cause_pair(const std::shared_ptr<const Cell>& cell, const
     });
     if (!known) specs.push_back(spec);
   }
-  Result<PhysicalModel> model = make_physical_model(cell, specs);
-  if (!model) return tl::make_unexpected(model.error());
-  CausePair pair{std::move(*model), cause, other, {}, {}};
+  PhysicalModel model = TRY(make_physical_model(cell, specs));
+  CausePair pair{std::move(model), cause, other, {}, {}};
   pair.model.values = planning_values(pair.model);
   Eigen::Index column = 0;
   for (const ErrorSourcePtr& source : pair.model.sources) {
-    std::vector<Eigen::Index>& into = source->name() == (*first)->name() ? pair.columns : pair.rest;
+    std::vector<Eigen::Index>& into = source->name() == first->name() ? pair.columns : pair.rest;
     for (std::size_t i = 0; i < source->parameters().size(); ++i) into.push_back(column++);
   }
   return pair;

@@ -488,9 +488,8 @@ Result<std::string> robot_path_in(const std::string& cell_yaml, const std::strin
 
 /// The text of the robot file that the cell names.
 Result<std::string> robot_text_of(const std::string& cell_yaml, const std::string& path, std::string& robot_path) {
-  const Result<std::string> found = robot_path_in(cell_yaml, path);
-  if (!found) return tl::make_unexpected(found.error());
-  robot_path = *found;
+  const std::string found = TRY(robot_path_in(cell_yaml, path));
+  robot_path = found;
   return file_text_of(robot_path).map_error([&](Error error) {
     return Failure(std::move(error)).of("robot").next(fmt::format("{} names it as its robot", path)).value();
   });
@@ -538,13 +537,12 @@ Result<Cell> parse_cell(const std::string& cell_yaml, const std::string& robot_y
 }
 
 Result<Cell> read_cell(const std::string& path) {
-  const Result<std::string> cell_yaml = read_text_file(path);
-  if (!cell_yaml) return tl::make_unexpected(cell_yaml.error());
+  const std::string cell_yaml = TRY(read_text_file(path));
   std::string robot_path;
-  const Result<std::string> robot_yaml = robot_text_of(*cell_yaml, path, robot_path);
+  const Result<std::string> robot_yaml = robot_text_of(cell_yaml, path, robot_path);
   const Result<Chain> robot =
       robot_yaml.and_then([&](const std::string& text) { return parse_robot(text, robot_path); });
-  Result<Cell> cell = cell_with(robot, *cell_yaml, path);
+  Result<Cell> cell = cell_with(robot, cell_yaml, path);
   if (cell) cell->robot_yaml = *robot_yaml;
   return cell;
 }

@@ -103,7 +103,7 @@ Result<std::string> with_error_sources(const std::string& cell_yaml, const std::
                                        const std::string& where) {
   std::string why = "the list stands elsewhere";
   try {
-    if (const Status fine = check_yaml_limits(cell_yaml, where); !fine) return tl::make_unexpected(fine.error());
+    TRY(check_yaml_limits(cell_yaml, where));
     const std::string text = edited(cell_yaml, YAML::Load(cell_yaml), sources);
     const auto read = YAML::Load(text)["model"]["error_sources"].as<std::vector<std::string>>();
     if (read == sources && all_but_the_list(text) == all_but_the_list(cell_yaml)) return text;

@@ -411,7 +411,7 @@ const char* to_text(RobotComparison::Verdict verdict) {
 }
 
 Result<RobotComparison> compare_robot(const Cell& cell, const ShownPoses& shown) {
-  if (const Status enough = check_shown(cell, shown); !enough) return tl::make_unexpected(enough.error());
+  TRY(check_shown(cell, shown));
   const Comparison comparison(cell.robot, shown);
   const Reading reading = nearest(cell, shown, comparison);
   if (reading.distance.worst <= 1) return fitting(cell, shown, reading);

@@ -28,13 +28,11 @@ Status check_joints(const JointVector& q, int index, const Chain& robot) {
 /// `pose` completed by the options and the course: tool, payload, time and temperature.
 Result<PoseContext> completed(PoseContext pose, int index, const VirtualRobot& robot, const SimulateOptions& options) {
   const Cell& cell = *robot.truth.cell;
-  if (const Status fine = check_joints(pose.q, index, cell.robot); !fine) return tl::make_unexpected(fine.error());
-  const Result<std::string> tool = resolve_tool(cell, pose.tool.empty() ? options.tool : pose.tool);
-  if (!tool) return tl::make_unexpected(tool.error());
-  const Result<std::string> payload = resolve_payload(cell, pose.payload.empty() ? options.payload : pose.payload);
-  if (!payload) return tl::make_unexpected(payload.error());
-  pose.tool = *tool;
-  pose.payload = *payload;
+  TRY(check_joints(pose.q, index, cell.robot));
+  const std::string tool = TRY(resolve_tool(cell, pose.tool.empty() ? options.tool : pose.tool));
+  const std::string payload = TRY(resolve_payload(cell, pose.payload.empty() ? options.payload : pose.payload));
+  pose.tool = tool;
+  pose.payload = payload;
   pose.index = index;
   const MeasuringCourse& course = robot.course;
   if (!pose.time && course.seconds_per_pose > 0) pose.time = index * course.seconds_per_pose;
@@ -57,12 +55,11 @@ Result<MeasurementBatch> simulate(const VirtualRobot& robot, const std::vector<P
   };
   MeasurementBatch batch;
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    Result<PoseContext> context = completed(poses[i], static_cast<int>(i), robot, options);
-    if (!context) return tl::make_unexpected(context.error());
+    PoseContext context = TRY(completed(poses[i], static_cast<int>(i), robot, options));
     Measurement m;
     m.pose_id = std::to_string(i + 1);
     m.row = static_cast<int>(i) + 2;
-    m.context = std::move(*context);
+    m.context = std::move(context);
     const Pose X_WT = robot.truth.pose_W(m.context);
     m.p_W = X_WT.translation() + noise(robot.sigma);
     const Matrix3 R_WT = rotation_exp(noise(robot.sigma_rotation)) * X_WT.linear();

@@ -46,29 +46,26 @@ void fill_in(JointList& list, const ApplyArguments& arguments) {
 }
 
 Result<client::CallContext> call_context(const ApplyArguments& arguments) {
-  const Result<ModelReference> model = parse_model_reference(arguments.model);
-  if (!model) return tl::make_unexpected(model.error());
+  const ModelReference model = TRY(parse_model_reference(arguments.model));
   client::CallContext context;
-  context.cell = model->cell;
+  context.cell = model.cell;
   context.tool = arguments.tool;
   context.payload = arguments.payload;
-  if (model->version > 0) context.model = fmt::format("@{}", model->version);
+  if (model.version > 0) context.model = fmt::format("@{}", model.version);
   return context;
 }
 
 Result<Predictions> predict_here(JointList& list, const ApplyArguments& arguments) {
-  const Result<CompensatedModel> model = load_model(arguments.model);
-  if (!model) return tl::make_unexpected(model.error());
-  Result<JointList> checked = check_against_cell(std::move(list), model->cell());
-  if (!checked) return tl::make_unexpected(checked.error());
-  list = std::move(*checked);
+  const CompensatedModel model = TRY(load_model(arguments.model));
+  JointList checked = TRY(check_against_cell(std::move(list), model.cell()));
+  list = std::move(checked);
   std::vector<PoseContext> poses;
   for (const CommandedPose& pose : list.poses) {
-    if (const Status known = model->check_trained_with(pose.context.tool, pose.context.payload); !known) {
+    if (const Status known = model.check_trained_with(pose.context.tool, pose.context.payload); !known) {
       return Failure(known.error()).as(ErrorCode::kRefused).in(list.where).at_row(pose.row);
     }
     PoseContext asked;
-    asked.q = from_wire(to_wire(pose.context.q, list.joint_types), model->cell().robot);
+    asked.q = from_wire(to_wire(pose.context.q, list.joint_types), model.cell().robot);
     asked.tool = pose.context.tool;
     asked.payload = pose.context.payload;
     asked.direction = pose.context.direction;
@@ -77,13 +74,13 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
     asked.served = true;
     poses.push_back(std::move(asked));
   }
-  Predictions predictions{model->provenance().id, {}, {}, {}, notes_of(*model)};
+  Predictions predictions{model.provenance().id, {}, {}, {}, notes_of(model)};
   ProgressLine progress;
   for (std::size_t from = 0; from < poses.size(); from += kPosesTogether) {
     progress.show("predicting", static_cast<double>(from) / static_cast<double>(poses.size()));
     const std::size_t to = std::min(from + kPosesTogether, poses.size());
     const auto place = [&](std::size_t i) { return poses.begin() + static_cast<std::ptrdiff_t>(i); };
-    for (const ErrorPrediction& prediction : model->predict_all({place(from), place(to)})) {
+    for (const ErrorPrediction& prediction : model.predict_all({place(from), place(to)})) {
       predictions.items.push_back(to_wire(prediction));
     }
   }
@@ -91,15 +88,14 @@ Result<Predictions> predict_here(JointList& list, const ApplyArguments& argument
 }
 
 Result<Predictions> predict_by_service(const JointList& list, const ApplyArguments& arguments) {
-  Result<client::CallContext> context = call_context(arguments);
-  if (!context) return tl::make_unexpected(context.error());
-  context->tool = list.poses.front().context.tool;
-  context->payload = list.poses.front().context.payload;
+  client::CallContext context = TRY(call_context(arguments));
+  context.tool = list.poses.front().context.tool;
+  context.payload = list.poses.front().context.payload;
   std::vector<client::CommandedJoints> poses;
   for (const CommandedPose& pose : list.poses) {
-    if (pose.context.tool != context->tool || pose.context.payload != context->payload) {
+    if (pose.context.tool != context.tool || pose.context.payload != context.payload) {
       return refused("tool '{}' and payload '{}' after '{}' and '{}'", pose.context.tool, pose.context.payload,
-                     context->tool, context->payload)
+                     context.tool, context.payload)
           .in(list.where)
           .at_row(pose.row)
           .of("tool_id")
@@ -108,13 +104,11 @@ Result<Predictions> predict_by_service(const JointList& list, const ApplyArgumen
     }
     poses.push_back({to_wire(pose.context.q, list.joint_types), approach_of(pose.context)});
   }
-  const auto session = open_session(arguments.service);
-  if (!session) return tl::make_unexpected(session.error());
+  const auto session = TRY(open_session(arguments.service));
   ProgressLine progress;
   auto answer =
-      (*session)->predict_error_at(*context, poses, [&](double share) { progress.show("predicting", share); });
-  if (!answer) return tl::make_unexpected(answer.error());
-  return Predictions{answer->model.id, std::move(answer->items), {}, {}, std::move(answer->model.notes)};
+      TRY(session->predict_error_at(context, poses, [&](double share) { progress.show("predicting", share); }));
+  return Predictions{answer.model.id, std::move(answer.items), {}, {}, std::move(answer.model.notes)};
 }
 
 /// What --covariance and --orientation ask for.
@@ -130,56 +124,47 @@ Status add_uncertainties(Predictions& predictions, const ApplyArguments& argumen
 }
 
 Status predict(const ApplyArguments& arguments) {
-  Result<JointList> list = read_joint_file(arguments.input);
-  if (!list) return tl::make_unexpected(list.error());
-  fill_in(*list, arguments);
-  Result<Predictions> predictions =
-      arguments.service.service ? predict_by_service(*list, arguments) : predict_here(*list, arguments);
-  if (!predictions) return tl::make_unexpected(predictions.error());
-  warn_of_notes(predictions->notes);
-  if (const Status added = add_uncertainties(*predictions, arguments); !added) return added;
-  return write_together({{"--output", arguments.output, predictions_csv(*list, *predictions)},
-                         {"--json", arguments.json, json_text(predictions_json(*list, *predictions))}});
+  JointList list = TRY(read_joint_file(arguments.input));
+  fill_in(list, arguments);
+  Predictions predictions =
+      TRY(arguments.service.service ? predict_by_service(list, arguments) : predict_here(list, arguments));
+  warn_of_notes(predictions.notes);
+  if (const Status added = add_uncertainties(predictions, arguments); !added) return added;
+  return write_together({{"--output", arguments.output, predictions_csv(list, predictions)},
+                         {"--json", arguments.json, json_text(predictions_json(list, predictions))}});
 }
 
 Result<Corrections> correct_here(const TargetFile& file, const ApplyArguments& arguments) {
-  const Result<CompensatedModel> model = load_model(arguments.model);
-  if (!model) return tl::make_unexpected(model.error());
-  if (const Status fits = check_targets(file, model->cell().robot); !fits) return tl::make_unexpected(fits.error());
-  const Result<std::string> tool = resolve_tool(model->cell(), arguments.tool);
-  if (!tool) return tl::make_unexpected(tool.error());
-  const Result<std::string> payload = resolve_payload(model->cell(), arguments.payload);
-  if (!payload) return tl::make_unexpected(payload.error());
-  if (const Status known = model->check_trained_with(*tool, *payload); !known)
-    return tl::make_unexpected(known.error());
-  Corrections corrections{model->provenance().id, joint_types(model->cell().robot), {}, notes_of(*model)};
+  const CompensatedModel model = TRY(load_model(arguments.model));
+  TRY(check_targets(file, model.cell().robot));
+  const std::string tool = TRY(resolve_tool(model.cell(), arguments.tool));
+  const std::string payload = TRY(resolve_payload(model.cell(), arguments.payload));
+  TRY(model.check_trained_with(tool, payload));
+  Corrections corrections{model.provenance().id, joint_types(model.cell().robot), {}, notes_of(model)};
   corrections.items.resize(file.rows.size());
   ProgressLine progress;
   in_parallel(
       file.rows.size(),
       [&](std::size_t i) {
-        const Target target = from_wire(to_wire(file.rows[i].target, corrections.joint_types), model->cell().robot);
-        corrections.items[i] = to_wire(model->correct(target, *tool, *payload), corrections.joint_types);
+        const Target target = from_wire(to_wire(file.rows[i].target, corrections.joint_types), model.cell().robot);
+        corrections.items[i] = to_wire(model.correct(target, tool, payload), corrections.joint_types);
       },
       [&](double share) { progress.show("correcting", share); });
   return corrections;
 }
 
 Result<Corrections> correct_by_service(const TargetFile& file, const ApplyArguments& arguments) {
-  const Result<client::CallContext> context = call_context(arguments);
-  if (!context) return tl::make_unexpected(context.error());
+  const client::CallContext context = TRY(call_context(arguments));
   std::vector<client::TargetMm> targets;
   for (const TargetRow& row : file.rows) targets.push_back(to_wire(row.target, file.joint_types));
-  const auto session = open_session(arguments.service);
-  if (!session) return tl::make_unexpected(session.error());
+  const auto session = TRY(open_session(arguments.service));
   ProgressLine progress;
   auto answer =
-      (*session)->correct_targets(*context, targets, [&](double share) { progress.show("correcting", share); });
-  if (!answer) return tl::make_unexpected(answer.error());
-  const bool all_unreachable = std::all_of(answer->items.begin(), answer->items.end(),
+      TRY(session->correct_targets(context, targets, [&](double share) { progress.show("correcting", share); }));
+  const bool all_unreachable = std::all_of(answer.items.begin(), answer.items.end(),
                                            [](const auto& item) { return item.status == "unreachable"; });
   if (all_unreachable && may_be_metres(file)) return tl::make_unexpected(looks_like_metres(file));
-  return Corrections{answer->model.id, file.joint_types, std::move(answer->items), std::move(answer->model.notes)};
+  return Corrections{answer.model.id, file.joint_types, std::move(answer.items), std::move(answer.model.notes)};
 }
 
 /// What correct is asked for, a program or a table of targets.
@@ -249,24 +234,22 @@ std::optional<ToleranceVerdict> verdict_of(const Corrections& corrections, doubl
 }
 
 Result<Extent> correct(CorrectArguments arguments) {
-  if (const Status usage = check_usage(arguments); !usage) return tl::make_unexpected(usage.error());
+  TRY(check_usage(arguments));
   if (is_program(arguments.inputs, arguments.format)) return correct_program(arguments.of_program());
   arguments.input = arguments.inputs[0];
-  const Result<TargetFile> file = read_targets_csv(arguments.input);
-  if (!file) return tl::make_unexpected(file.error());
-  const Result<Corrections> corrections =
-      arguments.service.service ? correct_by_service(*file, arguments) : correct_here(*file, arguments);
-  if (!corrections) return tl::make_unexpected(corrections.error());
-  warn_of_notes(corrections->notes);
-  const std::string left_alone = left_alone_text(*file, *corrections);
-  const auto verdict = verdict_of(*corrections, arguments.tolerance_mm);
+  const TargetFile file = TRY(read_targets_csv(arguments.input));
+  const Corrections corrections =
+      TRY(arguments.service.service ? correct_by_service(file, arguments) : correct_here(file, arguments));
+  warn_of_notes(corrections.notes);
+  const std::string left_alone = left_alone_text(file, corrections);
+  const auto verdict = verdict_of(corrections, arguments.tolerance_mm);
   if (arguments.strict) {
-    if (const Status held = check_strictly(left_alone, verdict); !held) return tl::make_unexpected(held.error());
+    TRY(check_strictly(left_alone, verdict));
   }
-  auto json = corrections_json(*file, *corrections);
-  json["notes"] = notes_json(corrections->notes);
+  auto json = corrections_json(file, corrections);
+  json["notes"] = notes_json(corrections.notes);
   if (verdict) json["tolerance"] = tolerance_json(*verdict);
-  const std::string table = corrections_csv(*file, *corrections);
+  const std::string table = corrections_csv(file, corrections);
   if (const Status written = write_together({{"--output", arguments.output, table},
                                              {"--receipt", arguments.receipt, table},
                                              {"--json", arguments.json, json_text(json)}});
@@ -274,7 +257,7 @@ Result<Extent> correct(CorrectArguments arguments) {
     return tl::make_unexpected(written.error());
   fmt::print(
       stderr, "{}",
-      shown_lines(corrections_summary(*corrections) + left_alone + (verdict ? verdict_text(*verdict) + "\n" : "")));
+      shown_lines(corrections_summary(corrections) + left_alone + (verdict ? verdict_text(*verdict) + "\n" : "")));
   return left_alone.empty() || arguments.allow_failed ? Extent::kAll : Extent::kPart;
 }
 
@@ -381,9 +364,9 @@ void add_predict(CLI::App& app, Action& chosen) {
   add_apply_options(*command, *arguments)->required();
   command->callback([arguments, &chosen] {
     chosen = [arguments]() -> Result<Extent> {
-      if (const Status usage = check_usage(*arguments); !usage) return tl::make_unexpected(usage.error());
+      TRY(check_usage(*arguments));
       if (!arguments->inputs.empty()) return predict_program(arguments->of_program());
-      if (const Status done = predict(*arguments); !done) return tl::make_unexpected(done.error());
+      TRY(predict(*arguments));
       return Extent::kAll;
     };
   });

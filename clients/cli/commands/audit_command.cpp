@@ -22,19 +22,15 @@ struct AuditArguments {
 Result<std::vector<std::pair<std::string, AuditTrail>>> trails(const AuditArguments& arguments) {
   std::vector<std::pair<std::string, AuditTrail>> all;
   if (!arguments.store.empty()) {
-    auto trail = read_audit(arguments.store, {arguments.cell, arguments.since, arguments.last});
-    if (!trail) return tl::make_unexpected(trail.error());
-    all.emplace_back(spoken_place(arguments.store), std::move(*trail));
+    auto trail = TRY(read_audit(arguments.store, {arguments.cell, arguments.since, arguments.last}));
+    all.emplace_back(spoken_place(arguments.store), std::move(trail));
     return all;
   }
-  const auto session = open_session(arguments.service);
-  if (!session) return tl::make_unexpected(session.error());
-  const auto texts = (*session)->audit(arguments.cell, arguments.since, arguments.last);
-  if (!texts) return tl::make_unexpected(texts.error());
-  for (const client::AuditText& text : *texts) {
-    auto trail = audit_of_json(text.json);
-    if (!trail) return tl::make_unexpected(trail.error());
-    all.emplace_back("server " + text.server, std::move(*trail));
+  const auto session = TRY(open_session(arguments.service));
+  const auto texts = TRY(session->audit(arguments.cell, arguments.since, arguments.last));
+  for (const client::AuditText& text : texts) {
+    auto trail = TRY(audit_of_json(text.json));
+    all.emplace_back("server " + text.server, std::move(trail));
   }
   return all;
 }
@@ -55,12 +51,11 @@ Status check_rows(const AuditTrail& trail) {
 }
 
 Status audit(const AuditArguments& arguments) {
-  const auto all = trails(arguments);
-  if (!all) return tl::make_unexpected(all.error());
+  const auto all = TRY(trails(arguments));
   std::string text;
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   std::optional<Error> broken;
-  for (const auto& [where, trail] : *all) {
+  for (const auto& [where, trail] : all) {
     text += audit_text(trail, where);
     json.push_back(audit_json(trail));
     json.back()["where"] = where;

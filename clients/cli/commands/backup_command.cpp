@@ -51,9 +51,8 @@ Result<std::vector<cam::SourceFile>> modules_of(const BackupArguments& arguments
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder, error))
     any |= cam::dialect_of_file(entry.path().string()) == cam::Dialect::kRapid;
   if (!any) return std::vector<cam::SourceFile>{};
-  Result<ProgramFiles> files = read_program_files({folder}, cam::name_of(cam::Dialect::kRapid));
-  if (!files) return tl::make_unexpected(files.error());
-  return std::move(files->files);
+  ProgramFiles files = TRY(read_program_files({folder}, cam::name_of(cam::Dialect::kRapid)));
+  return std::move(files.files);
 }
 
 /// As --frames of `correct` reads it. A program uses a few of them.
@@ -169,27 +168,22 @@ Status check_usage(const BackupArguments& arguments) {
 }
 
 Result<Extent> import_backup(const BackupArguments& arguments) {
-  if (const Status usage = check_usage(arguments); !usage) return tl::make_unexpected(usage.error());
+  TRY(check_usage(arguments));
   const std::string moc = inside(inside(arguments.backup, "SYSPAR"), "MOC.cfg");
-  const Result<std::string> parameters = parameters_of(arguments, moc);
-  if (!parameters) return tl::make_unexpected(parameters.error());
-  const auto modules = modules_of(arguments);
-  if (!modules) return tl::make_unexpected(modules.error());
-  const auto controller = cam::read_backup(*parameters, moc, *modules, arguments.unit);
+  const std::string parameters = TRY(parameters_of(arguments, moc));
+  const auto modules = TRY(modules_of(arguments));
+  const auto controller = cam::read_backup(parameters, moc, modules, arguments.unit);
   if (!controller) return tl::make_unexpected(advised(controller.error(), arguments));
   if (!arguments.robot.empty()) {
-    const Result<Chain> robot = read_robot(arguments.robot);
-    if (!robot) return tl::make_unexpected(robot.error());
-    if (const Status same = cam::check_robot(*controller, *robot); !same) return tl::make_unexpected(same.error());
+    const Chain robot = TRY(read_robot(arguments.robot));
+    TRY(cam::check_robot(*controller, robot));
   }
   std::vector<std::string> differing;
   if (!arguments.compare.empty()) {
-    const Result<Cell> cell = read_cell(arguments.compare);
-    if (!cell) return tl::make_unexpected(cell.error());
-    if (const Status same = cam::check_robot(*controller, cell->robot); !same) return tl::make_unexpected(same.error());
-    const Result<CellRules> rules = rules_of(*cell);
-    if (!rules) return tl::make_unexpected(rules.error());
-    differing = cam::differences(*controller, *cell, rules->controller_compensates);
+    const Cell cell = TRY(read_cell(arguments.compare));
+    TRY(cam::check_robot(*controller, cell.robot));
+    const CellRules rules = TRY(rules_of(cell));
+    differing = cam::differences(*controller, cell, rules.controller_compensates);
   }
   if (!arguments.output.empty()) {
     if (controller->tools.empty()) {
@@ -199,16 +193,13 @@ Result<Extent> import_backup(const BackupArguments& arguments) {
           .next("--task may have left out the modules that have it");
     }
     const std::string text = cam::cell_file_of(*controller, arguments.cell, robot_in(arguments));
-    if (const Status written = write_output(arguments.output, text); !written)
-      return tl::make_unexpected(written.error());
+    TRY(write_output(arguments.output, text));
   }
   if (!arguments.frames.empty()) {
-    if (const Status written = write_output(arguments.frames, frames_csv(*controller)); !written)
-      return tl::make_unexpected(written.error());
+    TRY(write_output(arguments.frames, frames_csv(*controller)));
   }
   tell(in_words(*controller, arguments, differing), {arguments.output, arguments.frames, arguments.json});
-  if (const Status written = write_json(arguments.json, as_json(*controller, differing)); !written)
-    return tl::make_unexpected(written.error());
+  TRY(write_json(arguments.json, as_json(*controller, differing)));
   return differing.empty() ? Extent::kAll : Extent::kPart;
 }
 

@@ -45,7 +45,7 @@ Result<std::int64_t> ask(client::Session& session, const std::string& cell, cons
 
 /// A check that a service made; its bytes come from outside.
 Result<nlohmann::ordered_json> check_of(const std::string& text, const std::string& what) {
-  if (const Status small = check_json_limits(text, what); !small) return tl::make_unexpected(small.error());
+  TRY(check_json_limits(text, what));
   nlohmann::ordered_json json = nlohmann::ordered_json::parse(text, nullptr, false);
   const bool whole = json.is_object() && json.contains("verdict") && json["verdict"].is_string() &&
                      json.contains("why") && json["why"].is_string();
@@ -54,9 +54,8 @@ Result<nlohmann::ordered_json> check_of(const std::string& text, const std::stri
 }
 
 Result<nlohmann::ordered_json> found_by(client::Session& session, const std::string& cell, std::int64_t job) {
-  const auto found = session.diagnosis(cell, job, false);
-  if (!found) return tl::make_unexpected(found.error());
-  return check_of(found->findings_json, fmt::format("what job {} found", job));
+  const auto found = TRY(session.diagnosis(cell, job, false));
+  return check_of(found.findings_json, fmt::format("what job {} found", job));
 }
 
 /// What the measurements are called: a file without its folder and ending, or the id that the service has them by.
@@ -91,54 +90,47 @@ Status write_report(const nlohmann::ordered_json& found, const HealthPageOf& of,
 
 /// What earlier checks said.
 Status tell_health(client::Session& session, const std::string& cell, const CheckArguments& arguments) {
-  const auto cells = health_at(session, cell, 0);
-  if (!cells) return tl::make_unexpected(cells.error());
+  const auto cells = TRY(health_at(session, cell, 0));
   std::string text;
-  for (const auto& one : *cells) text += cell_health_text(one);
+  for (const auto& one : cells) text += cell_health_text(one);
   tell(text, {arguments.json});
-  return write_json(arguments.json, {{"cells", *cells}});
+  return write_json(arguments.json, {{"cells", cells}});
 }
 
 Status check_at_service(const CheckArguments& arguments) {
   if (arguments.new_tool) return failure(ErrorCode::kUsage, "--new-tool is for files").of("--new-tool");
   if (!arguments.earlier.empty()) return failure(ErrorCode::kUsage, "--earlier is for files").of("--earlier");
-  const Result<ModelReference> model = parse_model_reference(arguments.model);
-  if (!model) return tl::make_unexpected(model.error());
-  if (model->version != 0) {
+  const ModelReference model = TRY(parse_model_reference(arguments.model));
+  if (model.version != 0) {
     return failure(ErrorCode::kUsage, "a service checks against the model in force")
         .of("--model")
         .next("name the cell alone");
   }
-  const auto session = open_session(arguments.service);
-  if (!session) return tl::make_unexpected(session.error());
-  if (arguments.batch.empty()) return tell_health(**session, model->cell, arguments);
-  const Result<std::int64_t> job = ask(**session, model->cell, arguments);
-  if (!job) return tl::make_unexpected(job.error());
-  const Result<client::JobStatus> end = [&] {
+  const auto session = TRY(open_session(arguments.service));
+  if (arguments.batch.empty()) return tell_health(*session, model.cell, arguments);
+  const std::int64_t job = TRY(ask(*session, model.cell, arguments));
+  const client::JobStatus end = TRY([&] {
     ProgressLine progress;
-    return (*session)->wait_for_job(*job, std::chrono::hours(1), [&](const client::JobStatus& status) {
+    return session->wait_for_job(job, std::chrono::hours(1), [&](const client::JobStatus& status) {
       progress.show(fmt::format("job {} {}: {}", status.job, status.stage, status.what), status.share);
     });
-  }();
-  if (!end) return tl::make_unexpected(end.error());
-  if (end->stage == "failed") return refused("job {} of cell {} failed: {}", end->job, end->cell, end->what).of("job");
-  const auto json = found_by(**session, model->cell, *job);
-  if (!json) return tl::make_unexpected(json.error());
-  tell(check_text(*json), {arguments.json, arguments.report});
-  if (const Status written = write_report(*json, {model->cell, batch_name(arguments.batch), unix_now()}, arguments);
+  }());
+  if (end.stage == "failed") return refused("job {} of cell {} failed: {}", end.job, end.cell, end.what).of("job");
+  const auto json = TRY(found_by(*session, model.cell, job));
+  tell(check_text(json), {arguments.json, arguments.report});
+  if (const Status written = write_report(json, {model.cell, batch_name(arguments.batch), unix_now()}, arguments);
       !written)
     return written;
-  return write_json(arguments.json, *json);
+  return write_json(arguments.json, json);
 }
 
 /// What checks before this one saw of the arm's drift: files that `--json` wrote.
 Result<std::vector<DriftSeen>> earlier_drift(const std::vector<std::string>& files) {
   std::vector<DriftSeen> all;
   for (const std::string& file : files) {
-    const Result<std::string> text = read_text_file(file);
-    if (!text) return tl::make_unexpected(text.error());
-    if (const auto json = check_of(*text, file); !json) return Failure(json.error()).as(ErrorCode::kRefused).in(file);
-    if (auto drift = drift_of(*text)) all.push_back(std::move(*drift));
+    const std::string text = TRY(read_text_file(file));
+    if (const auto json = check_of(text, file); !json) return Failure(json.error()).as(ErrorCode::kRefused).in(file);
+    if (auto drift = drift_of(text)) all.push_back(std::move(*drift));
   }
   return all;
 }
@@ -149,30 +141,25 @@ Status check(const CheckArguments& arguments) {
         .of("--batch")
         .next("trammel plan --check N plans the poses");
   }
-  const Result<CompensatedModel> model = load_model(arguments.model);
-  if (!model) return tl::make_unexpected(model.error());
-  const Result<CheckedBatch> batch = read_batch(arguments.batch).and_then([&](MeasurementBatch read) {
-    return check_against_cell(std::move(read), model->cell());
-  });
-  if (!batch) return tl::make_unexpected(batch.error());
+  const CompensatedModel model = TRY(load_model(arguments.model));
+  const CheckedBatch batch = TRY(read_batch(arguments.batch).and_then([&](MeasurementBatch read) {
+    return check_against_cell(std::move(read), model.cell());
+  }));
   HealthOptions options;
-  const Result<CellRules> rules = rules_of(model->cell());
-  if (!rules) return tl::make_unexpected(rules.error());
-  options.tolerance = rules->tolerance.value_or(kUsualTolerance);
+  const CellRules rules = TRY(rules_of(model.cell()));
+  options.tolerance = rules.tolerance.value_or(kUsualTolerance);
   if (arguments.tolerance_mm) options.tolerance = *arguments.tolerance_mm * from_mm(1);
   options.new_tool = arguments.new_tool;
-  Result<std::vector<DriftSeen>> earlier = earlier_drift(arguments.earlier);
-  if (!earlier) return tl::make_unexpected(earlier.error());
-  options.earlier = std::move(*earlier);
-  const Result<HealthCheck> health = check_health(*model, *batch, options);
-  if (!health) return tl::make_unexpected(health.error());
-  const auto& rows = batch->rows().measurements;
-  auto json = health_json(*health, {batch->id(), rows.empty() ? "" : rows.front().pose_id});
-  const std::vector<Note> notes = notes_of(*model);
+  std::vector<DriftSeen> earlier = TRY(earlier_drift(arguments.earlier));
+  options.earlier = std::move(earlier);
+  const HealthCheck health = TRY(check_health(model, batch, options));
+  const auto& rows = batch.rows().measurements;
+  auto json = health_json(health, {batch.id(), rows.empty() ? "" : rows.front().pose_id});
+  const std::vector<Note> notes = notes_of(model);
   warn_of_notes(notes);
   json["notes"] = notes_json(notes);
-  tell(health_text(*health), {arguments.json, arguments.report});
-  const Status written = write_report(json, {model->cell().name, batch->id(), unix_now(), &model->cell()}, arguments);
+  tell(health_text(health), {arguments.json, arguments.report});
+  const Status written = write_report(json, {model.cell().name, batch.id(), unix_now(), &model.cell()}, arguments);
   if (!written) return written;
   return write_json(arguments.json, json);
 }

@@ -58,30 +58,24 @@ Status note_in_cell(const ConfirmArguments& arguments, const Cell& cell, const R
     confirmation = RobotConfirmation{sha256_hex(cell.robot_yaml), found.poses, to_mm(found.position_max),
                                      to_deg(found.rotation_max), shown_day(unix_now())};
   }
-  const Result<std::string> text = with_confirmation(cell, confirmation);
-  if (!text) return tl::make_unexpected(text.error());
-  if (*text == cell.cell_yaml) return {};
-  return write_output(arguments.cell, *text);
+  const std::string text = TRY(with_confirmation(cell, confirmation));
+  if (text == cell.cell_yaml) return {};
+  return write_output(arguments.cell, text);
 }
 
 Result<Extent> confirm(const ConfirmArguments& arguments) {
   Outputs outputs;
   outputs.add("--json", arguments.json);
-  if (const Status usable = outputs.check({{"--cell", arguments.cell}, {"--poses", arguments.poses}}); !usable)
-    return tl::make_unexpected(usable.error());
-  const Result<Cell> cell = read_cell(arguments.cell);
-  if (!cell) return tl::make_unexpected(cell.error());
-  const Result<ShownPoses> shown = read_shown_poses(arguments.poses, cell->robot);
-  if (!shown) return tl::make_unexpected(shown.error());
-  const Result<RobotComparison> found = compare_robot(*cell, *shown).map_error([&](Error error) {
+  TRY(outputs.check({{"--cell", arguments.cell}, {"--poses", arguments.poses}}));
+  const Cell cell = TRY(read_cell(arguments.cell));
+  const ShownPoses shown = TRY(read_shown_poses(arguments.poses, cell.robot));
+  const RobotComparison found = TRY(compare_robot(cell, shown).map_error([&](Error error) {
     return Failure(std::move(error)).in(arguments.poses).value();
-  });
-  if (!found) return tl::make_unexpected(found.error());
-  if (const Status noted = note_in_cell(arguments, *cell, *found); !noted) return tl::make_unexpected(noted.error());
-  tell(comparison_text(*found), {arguments.json});
-  if (const Status written = write_json(arguments.json, comparison_json(*cell, *found)); !written)
-    return tl::make_unexpected(written.error());
-  return found->verdict == RobotComparison::Verdict::kConfirmed ? Extent::kAll : Extent::kPart;
+  }));
+  TRY(note_in_cell(arguments, cell, found));
+  tell(comparison_text(found), {arguments.json});
+  TRY(write_json(arguments.json, comparison_json(cell, found)));
+  return found.verdict == RobotComparison::Verdict::kConfirmed ? Extent::kAll : Extent::kPart;
 }
 
 }  // namespace

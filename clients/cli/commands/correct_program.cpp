@@ -42,8 +42,7 @@ std::string today() {
 cam::AskCorrections ask_model(const CompensatedModel& model, ProgressLine& progress) {
   return [&](const std::string& asked_tool, const std::string& asked_payload,
              const std::vector<client::TargetMm>& targets) -> Result<client::Answer<client::CorrectedTarget>> {
-    const auto known = known_tool_and_payload(model, asked_tool, asked_payload);
-    if (!known) return tl::make_unexpected(known.error());
+    const auto known = TRY(known_tool_and_payload(model, asked_tool, asked_payload));
     client::Answer<client::CorrectedTarget> answer{info_of(model), {}};
     answer.items.resize(targets.size());
     const std::vector<JointType> types = joint_types(model.cell().robot);
@@ -51,7 +50,7 @@ cam::AskCorrections ask_model(const CompensatedModel& model, ProgressLine& progr
         targets.size(),
         [&](std::size_t i) {
           answer.items[i] =
-              to_wire(model.correct(from_wire(targets[i], model.cell().robot), known->tool, known->payload), types);
+              to_wire(model.correct(from_wire(targets[i], model.cell().robot), known.tool, known.payload), types);
         },
         [&](double share) { progress.show("correcting", share); });
     return answer;
@@ -75,12 +74,11 @@ Result<Corrected> with_papers(Result<cam::CorrectedProgram> program, const Compe
 }
 
 Result<Corrected> correct_here(const cam::Program& program, const CorrectProgramArguments& arguments) {
-  const Result<CompensatedModel> model = load_model(arguments.model);
-  if (!model) return tl::make_unexpected(model.error());
+  const CompensatedModel model = TRY(load_model(arguments.model));
   ProgressLine progress;
-  return with_papers(cam::correct_program(program, model->cell().robot, tools_of(*model), ask_model(*model, progress),
+  return with_papers(cam::correct_program(program, model.cell().robot, tools_of(model), ask_model(model, progress),
                                           options_of(arguments)),
-                     *model);
+                     model);
 }
 
 /// Tools and robot come from the model that answers.
@@ -156,13 +154,10 @@ Status check_receipts_are_apart(const ProgramFiles& program, const std::vector<s
 }
 
 Result<Extent> undo(const ProgramFiles& marked, const CorrectProgramArguments& arguments) {
-  const Result<ProgramFiles> before = originals_of(marked, false);
-  if (!before) return tl::make_unexpected(before.error());
-  const auto paths = output_paths(marked, arguments.output);
-  if (!paths) return tl::make_unexpected(paths.error());
-  const std::vector<bool> none(before->files.size(), false);
-  if (const Status written = write_texts(texts_of(*before, before->files, none, *paths), *paths); !written)
-    return tl::make_unexpected(written.error());
+  const ProgramFiles before = TRY(originals_of(marked, false));
+  const auto paths = TRY(output_paths(marked, arguments.output));
+  const std::vector<bool> none(before.files.size(), false);
+  TRY(write_texts(texts_of(before, before.files, none, paths), paths));
   return Extent::kAll;
 }
 
@@ -196,25 +191,21 @@ Result<Extent> correct_program(const CorrectProgramArguments& arguments) {
   if (arguments.undo) return undo(*files, arguments);
   if (arguments.again) files = originals_of(*files, true);
   if (!files) return tl::make_unexpected(files.error());
-  const auto paths = output_paths(*files, arguments.output);
-  if (!paths) return tl::make_unexpected(paths.error());
-  if (const Status apart = check_receipts_are_apart(*files, *paths, arguments); !apart)
-    return tl::make_unexpected(apart.error());
-  const Result<cam::Program> program = read(*files, arguments);
-  if (!program) return tl::make_unexpected(program.error());
-  const Result<Corrected> done =
-      arguments.service.service ? correct_by_service(*program, arguments) : correct_here(*program, arguments);
-  if (!done) return tl::make_unexpected(done.error());
-  const cam::CorrectedProgram& corrected = done->program;
+  const auto paths = TRY(output_paths(*files, arguments.output));
+  TRY(check_receipts_are_apart(*files, paths, arguments));
+  const cam::Program program = TRY(read(*files, arguments));
+  const Corrected done =
+      TRY(arguments.service.service ? correct_by_service(program, arguments) : correct_here(program, arguments));
+  const cam::CorrectedProgram& corrected = done.program;
   const std::string left = left_alone_text(corrected);
   const auto verdict = verdict_of(corrected, arguments.tolerance_mm);
   if (arguments.strict) {
-    if (const Status held = check_strictly(left, verdict); !held) return tl::make_unexpected(held.error());
+    TRY(check_strictly(left, verdict));
   }
-  warn_of_notes(done->notes);
-  Texts texts = texts_of(*files, corrected.files, corrected.changed, *paths);
-  add_receipts(*done, arguments, verdict, texts);
-  if (const Status written = write_texts(texts, *paths); !written) return tl::make_unexpected(written.error());
+  warn_of_notes(done.notes);
+  Texts texts = texts_of(*files, corrected.files, corrected.changed, paths);
+  add_receipts(done, arguments, verdict, texts);
+  TRY(write_texts(texts, paths));
   const std::string held_against = verdict ? verdict_text(*verdict) + "\n" : "";
   fmt::print(stderr, "{}", shown_lines(receipt_summary(corrected) + left + held_against));
   return left.empty() || arguments.allow_failed ? Extent::kAll : Extent::kPart;

@@ -82,9 +82,8 @@ Result<Applied> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatc
     found->why_not = fmt::format("cell {}: {}", cell->name, found->why_not);
     return found;
   }
-  Result<std::string> text = with_error_sources(cell->cell_yaml, extension.lasting, arguments.cell);
-  if (!text) return tl::make_unexpected(text.error());
-  outputs.put(kCellOption, std::move(*text));
+  std::string text = TRY(with_error_sources(cell->cell_yaml, extension.lasting, arguments.cell));
+  outputs.put(kCellOption, std::move(text));
   outputs.put("--model", serialize(extension.after));
   return found;
 }
@@ -112,21 +111,17 @@ Result<Extent> diagnose_files(const DiagnoseArguments& arguments) {
   outputs.add("--model", arguments.model);
   std::vector<NamedFile> inputs = {{"--cell", arguments.cell}};
   for (const std::string& path : arguments.batches) inputs.push_back({"--batch", path});
-  if (const Status fine = outputs.check(inputs); !fine) return tl::make_unexpected(fine.error());
-  Result<Cell> read = read_cell_to_train(arguments.cell);
-  if (!read) return tl::make_unexpected(read.error());
-  const auto cell = std::make_shared<const Cell>(std::move(*read));
-  const Result<CheckedBatch> batch = batch_to_diagnose(arguments, *cell);
-  if (!batch) return tl::make_unexpected(batch.error());
-  const Result<Diagnosis> diagnosis = run_diagnosis(cell, *batch, arguments.seed);
-  if (!diagnosis) return tl::make_unexpected(with_rows_set_aside(diagnosis.error(), *batch));
+  TRY(outputs.check(inputs));
+  Cell read = TRY(read_cell_to_train(arguments.cell));
+  const auto cell = std::make_shared<const Cell>(std::move(read));
+  const CheckedBatch batch = TRY(batch_to_diagnose(arguments, *cell));
+  const Result<Diagnosis> diagnosis = run_diagnosis(cell, batch, arguments.seed);
+  if (!diagnosis) return tl::make_unexpected(with_rows_set_aside(diagnosis.error(), batch));
   ordered_json json = diagnosis_json(*diagnosis);
   say(diagnosis_text(json), arguments);
   std::optional<Result<Applied>> applied;
-  if (arguments.apply) applied = apply(cell, *batch, *diagnosis, arguments, json, outputs);
-  if (const Status written = write_diagnosis(json, diagnosis_page(*diagnosis, *cell), outputs, arguments); !written) {
-    return tl::make_unexpected(written.error());
-  }
+  if (arguments.apply) applied = apply(cell, batch, *diagnosis, arguments, json, outputs);
+  TRY(write_diagnosis(json, diagnosis_page(*diagnosis, *cell), outputs, arguments));
   if (!applied) return Extent::kAll;
   if (!*applied) return tl::make_unexpected(applied->error());
   return tell_applied(**applied, arguments);

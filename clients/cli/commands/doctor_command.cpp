@@ -249,17 +249,16 @@ std::string as_text(const std::vector<Found>& found) {
 
 Result<Extent> examine(const DoctorArguments& arguments) {
   const ServiceOptions& service = arguments.service;
-  const auto places = places_of(service);
-  if (!places) return tl::make_unexpected(places.error());
+  const auto places = TRY(places_of(service));
   std::vector<Found> found = {{"version", State::kGood, TRAMMEL_VERSION, ""}};
   std::set<std::string> hosts;
-  for (const HostPort& place : *places) {
+  for (const HostPort& place : places) {
     if (hosts.insert(place.address).second) found.push_back(network(place.address));
   }
-  for (const HostPort& place : *places) {
+  for (const HostPort& place : places) {
     if (is_of_this_host(place)) found.push_back(port(place.address, place.port));
   }
-  look_at_servers(service, *places, found);
+  look_at_servers(service, places, found);
   found.push_back(clock());
   std::vector<fs::path> folders = {"."};
   if (!arguments.store.empty()) {
@@ -267,13 +266,12 @@ Result<Extent> examine(const DoctorArguments& arguments) {
     if (fs::path(arguments.store).has_parent_path()) folders.push_back(fs::path(arguments.store).parent_path());
   }
   found.push_back(leftovers(folders));
-  found.push_back(certificates(service.security, *places));
+  found.push_back(certificates(service.security, places));
   tell(as_text(found), {arguments.json});
   nlohmann::ordered_json checks = nlohmann::ordered_json::array();
   for (const Found& one : found)
     checks.push_back({{"check", one.check}, {"state", name_of(one.state)}, {"what", one.what}, {"next", one.next}});
-  const Status written = write_json(arguments.json, {{"version", TRAMMEL_VERSION}, {"checks", std::move(checks)}});
-  if (!written) return tl::make_unexpected(written.error());
+  TRY(write_json(arguments.json, {{"version", TRAMMEL_VERSION}, {"checks", std::move(checks)}}));
   const bool bad = std::any_of(found.begin(), found.end(), [](const Found& one) { return one.state == State::kBad; });
   return bad ? Extent::kPart : Extent::kAll;
 }

@@ -25,23 +25,19 @@ struct FleetArguments {
 Result<ordered_json> fleet_of_files(const std::vector<std::string>& paths) {
   std::vector<FleetEntry> cells;
   for (const std::string& path : paths) {
-    Result<CompensatedModel> model = load_model(path);
-    if (!model) return tl::make_unexpected(model.error());
-    cells.push_back({path, 0, std::move(*model), ""});
+    CompensatedModel model = TRY(load_model(path));
+    cells.push_back({path, 0, std::move(model), ""});
   }
   return fleet_json(cells);
 }
 
 /// Of every server; their bytes come from outside.
 Result<ordered_json> fleet_of_service(const FleetArguments& arguments) {
-  const auto session = open_session(arguments.service);
-  if (!session) return tl::make_unexpected(session.error());
-  const auto texts = (*session)->fleet();
-  if (!texts) return tl::make_unexpected(texts.error());
+  const auto session = TRY(open_session(arguments.service));
+  const auto texts = TRY(session->fleet());
   ordered_json all = {{"cells", ordered_json::array()}, {"types", ordered_json::array()}};
-  for (const std::string& text : *texts) {
-    if (const Status small = check_json_limits(text, "the service's fleet"); !small)
-      return tl::make_unexpected(small.error());
+  for (const std::string& text : texts) {
+    TRY(check_json_limits(text, "the service's fleet"));
     const ordered_json one = ordered_json::parse(text, nullptr, false);
     for (const char* key : {"cells", "types"}) {
       if (!one.is_object() || !one.contains(key) || !one[key].is_array())
@@ -60,19 +56,18 @@ Status fleet(const FleetArguments& arguments) {
   outputs.add("--report", arguments.report);
   outputs.add("--json", arguments.json);
   if (const Status usable = outputs.check({}); !usable) return usable;
-  const Result<ordered_json> json =
-      arguments.service.service ? fleet_of_service(arguments) : fleet_of_files(arguments.models);
-  if (!json) return tl::make_unexpected(json.error());
+  const ordered_json json =
+      TRY(arguments.service.service ? fleet_of_service(arguments) : fleet_of_files(arguments.models));
   if (!arguments.report.empty()) {
-    const std::string page = with_pages_beside(fleet_page(*json, unix_now()), arguments.report);
+    const std::string page = with_pages_beside(fleet_page(json, unix_now()), arguments.report);
     if (const Status written = write_output(arguments.report, page); !written) return written;
   }
   try {
-    tell(fleet_text(*json), {arguments.json, arguments.report});
+    tell(fleet_text(json), {arguments.json, arguments.report});
   } catch (const ordered_json::exception& error) {
     return failure(ErrorCode::kInternal, "the service's fleet is none: {}", error.what());
   }
-  return write_json(arguments.json, *json);
+  return write_json(arguments.json, json);
 }
 
 }  // namespace

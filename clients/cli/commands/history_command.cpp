@@ -42,16 +42,15 @@ VersionOnRecord on_record(const CompensatedModel& model, int version) {
 Result<CellHistory> history_of_files(const HistoryArguments& arguments) {
   CellHistory history;
   for (const std::string& path : arguments.models) {
-    const Result<CompensatedModel> model = load_model(path);
-    if (!model) return tl::make_unexpected(model.error());
-    if (history.cell.empty()) history.cell = model->cell().name;
-    if (model->cell().name != history.cell) {
-      return refused("the model is of cell {}, the ones before it are of {}", model->cell().name, history.cell)
+    const CompensatedModel model = TRY(load_model(path));
+    if (history.cell.empty()) history.cell = model.cell().name;
+    if (model.cell().name != history.cell) {
+      return refused("the model is of cell {}, the ones before it are of {}", model.cell().name, history.cell)
           .in(path)
           .of("cell")
           .next("give models of one cell");
     }
-    history.versions.push_back(on_record(*model, static_cast<int>(history.versions.size()) + 1));
+    history.versions.push_back(on_record(model, static_cast<int>(history.versions.size()) + 1));
   }
   history.of_files = true;
   return history;
@@ -69,9 +68,8 @@ VersionOnRecord version_of(client::Session& session, const client::ModelInfo& in
 }
 
 Status add_trainings(client::Session& session, CellHistory& history) {
-  const auto jobs = session.jobs(history.cell);
-  if (!jobs) return tl::make_unexpected(jobs.error());
-  for (const client::DatedJob& job : *jobs) {
+  const auto jobs = TRY(session.jobs(history.cell));
+  for (const client::DatedJob& job : jobs) {
     if (job.kind != "train" || !job.finished_unix_s) continue;
     history.trainings.push_back({*job.finished_unix_s, fmt::format("{}", fmt::join(job.batches, "+")),
                                  job.status.verdict, job.status.why, metres(job.status.before_mm),
@@ -81,31 +79,24 @@ Status add_trainings(client::Session& session, CellHistory& history) {
 }
 
 Status add_events(client::Session& session, std::size_t last, CellHistory& history) {
-  const auto texts = session.audit(history.cell, 0, last);
-  if (!texts) return tl::make_unexpected(texts.error());
-  for (const client::AuditText& text : *texts) {
-    const auto trail = audit_of_json(text.json);
-    if (!trail) return tl::make_unexpected(trail.error());
-    for (const AuditRow& row : trail->rows) history.events.push_back({row.at, row.what, row.subject, row.why, row.who});
+  const auto texts = TRY(session.audit(history.cell, 0, last));
+  for (const client::AuditText& text : texts) {
+    const auto trail = TRY(audit_of_json(text.json));
+    for (const AuditRow& row : trail.rows) history.events.push_back({row.at, row.what, row.subject, row.why, row.who});
   }
   return {};
 }
 
 Result<CellHistory> history_of_service(const HistoryArguments& arguments) {
-  const Result<std::string> cell = cell_id(arguments.cell);
-  if (!cell) return tl::make_unexpected(cell.error());
-  const auto session = open_session(arguments.service);
-  if (!session) return tl::make_unexpected(session.error());
-  auto models = (*session)->models(*cell);
-  if (!models) return tl::make_unexpected(models.error());
-  std::sort(models->begin(), models->end(), [](const auto& a, const auto& b) { return a.version < b.version; });
-  const std::size_t skipped = models->size() - std::min(models->size(), arguments.last);
-  CellHistory history{*cell};
-  for (std::size_t i = skipped; i < models->size(); ++i)
-    history.versions.push_back(version_of(**session, (*models)[i]));
-  if (const Status added = add_trainings(**session, history); !added) return tl::make_unexpected(added.error());
-  if (const Status added = add_events(**session, 10 * arguments.last, history); !added)
-    return tl::make_unexpected(added.error());
+  const std::string cell = TRY(cell_id(arguments.cell));
+  const auto session = TRY(open_session(arguments.service));
+  auto models = TRY(session->models(cell));
+  std::sort(models.begin(), models.end(), [](const auto& a, const auto& b) { return a.version < b.version; });
+  const std::size_t skipped = models.size() - std::min(models.size(), arguments.last);
+  CellHistory history{cell};
+  for (std::size_t i = skipped; i < models.size(); ++i) history.versions.push_back(version_of(*session, models[i]));
+  TRY(add_trainings(*session, history));
+  TRY(add_events(*session, 10 * arguments.last, history));
   return history;
 }
 
@@ -118,14 +109,12 @@ Status history(const HistoryArguments& arguments) {
   std::vector<NamedFile> inputs;
   for (const std::string& path : arguments.models) inputs.push_back({"--model", path});
   if (const Status usable = outputs.check(inputs); !usable) return usable;
-  const Result<CellHistory> found =
-      arguments.models.empty() ? history_of_service(arguments) : history_of_files(arguments);
-  if (!found) return tl::make_unexpected(found.error());
-  outputs.put("--output", with_pages_beside(history_page(*found), arguments.output));
-  outputs.put("--json", json_text(history_json(*found)));
+  const CellHistory found = TRY(arguments.models.empty() ? history_of_service(arguments) : history_of_files(arguments));
+  outputs.put("--output", with_pages_beside(history_page(found), arguments.output));
+  outputs.put("--json", json_text(history_json(found)));
   if (const Status written = outputs.write(); !written) return written;
-  tell(fmt::format("cell {}: {} versions, {} parameters moved by more than their uncertainty\n", found->cell,
-                   found->versions.size(), moved_parameters(*found).size()),
+  tell(fmt::format("cell {}: {} versions, {} parameters moved by more than their uncertainty\n", found.cell,
+                   found.versions.size(), moved_parametersfound.size()),
        {arguments.output, arguments.json});
   return {};
 }

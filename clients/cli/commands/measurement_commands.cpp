@@ -64,12 +64,10 @@ Result<Converted> read_converted(const ConvertArguments& arguments) {
   }
   const PointFileOptions options{said(kUnits, arguments.unit), said(kCoordinates, arguments.coordinates),
                                  said(kBehind, arguments.behind), arguments.coverage};
-  const Result<PointList> points = read_points(arguments.points, options);
-  if (!points) return tl::make_unexpected(points.error());
-  const Result<JointList> joints = read_joint_file(arguments.joints);
-  if (!joints) return tl::make_unexpected(joints.error());
-  return join_points(*points, *joints, arguments.in_order).map([&](MeasurementBatch batch) {
-    const std::size_t not_measured = joints->poses.size() - batch.measurements.size();
+  const PointList points = TRY(read_points(arguments.points, options));
+  const JointList joints = TRY(read_joint_file(arguments.joints));
+  return join_points(points, joints, arguments.in_order).map([&](MeasurementBatch batch) {
+    const std::size_t not_measured = joints.poses.size() - batch.measurements.size();
     return Converted{std::move(batch), not_measured};
   });
 }
@@ -78,20 +76,19 @@ Status convert(const ConvertArguments& arguments) {
   if (!arguments.points.empty() && arguments.joints.empty()) {
     return failure(ErrorCode::kUsage, "--points needs --joints").of("--joints").next("name the plan that was measured");
   }
-  Result<Converted> converted = read_converted(arguments);
-  if (!converted) return tl::make_unexpected(converted.error());
-  for (Measurement& m : converted->batch.measurements) {
+  Converted converted = TRY(read_converted(arguments));
+  for (Measurement& m : converted.batch.measurements) {
     if (m.context.tool.empty()) m.context.tool = arguments.tool;
     if (m.context.payload.empty()) m.context.payload = arguments.payload;
   }
-  const std::size_t count = converted->batch.measurements.size();
-  if (const Status written = write_output(arguments.output, to_csv(converted->batch)); !written) return written;
+  const std::size_t count = converted.batch.measurements.size();
+  if (const Status written = write_output(arguments.output, to_csv(converted.batch)); !written) return written;
   tell(fmt::format("{} measurements in {}{}\n", count, arguments.output,
-                   converted->not_measured == 0
+                   converted.not_measured == 0
                        ? ""
-                       : fmt::format("; {} poses of {} not measured", converted->not_measured, arguments.joints)),
+                       : fmt::format("; {} poses of {} not measured", converted.not_measured, arguments.joints)),
        {arguments.output, arguments.json});
-  return write_json(arguments.json, {{"measurements", count}, {"not_measured", converted->not_measured}});
+  return write_json(arguments.json, {{"measurements", count}, {"not_measured", converted.not_measured}});
 }
 
 struct ReferencesArguments {
@@ -175,16 +172,13 @@ Status check_reflectors(const ReferencesArguments& arguments) {
     return failure(ErrorCode::kUsage, "--batch and --output belong together")
         .of(arguments.batch.empty() ? "--batch" : "--output");
   }
-  const Result<PointList> nominal = read_points(arguments.nominal);
-  if (!nominal) return tl::make_unexpected(nominal.error());
-  const Result<PointList> measured = read_points(arguments.measured);
-  if (!measured) return tl::make_unexpected(measured.error());
-  const Result<ReferenceCheck> check =
-      check_references(*nominal, *measured, {from_mm(arguments.localise_above_mm), from_mm(arguments.repeat_above_mm)});
-  if (!check) return tl::make_unexpected(check.error());
-  tell(references_text(*check), {arguments.output, arguments.json});
-  if (const Status written = write_json(arguments.json, references_json(*check)); !written) return written;
-  return localise_batch(arguments, *check);
+  const PointList nominal = TRY(read_points(arguments.nominal));
+  const PointList measured = TRY(read_points(arguments.measured));
+  const ReferenceCheck check = TRY(
+      check_references(nominal, measured, {from_mm(arguments.localise_above_mm), from_mm(arguments.repeat_above_mm)}));
+  tell(references_text(check), {arguments.output, arguments.json});
+  if (const Status written = write_json(arguments.json, references_json(check)); !written) return written;
+  return localise_batch(arguments, check);
 }
 
 void add_convert(CLI::App& app, Action& chosen) {

@@ -80,9 +80,8 @@ Status hold_against(const CompensatedModel& from, const std::vector<std::string>
 
 /// What robots of the cell's type have in common, by the models of `paths`; empty where nobody wants to know.
 Result<std::optional<FleetPrior>> fleet_prior(const std::vector<std::string>& paths, const Cell& cell) {
-  const Result<CellRules> rules = rules_of(cell);
-  if (!rules) return tl::make_unexpected(rules.error());
-  if (!rules->fleet_prior && paths.empty()) return std::optional<FleetPrior>();
+  const CellRules rules = TRY(rules_of(cell));
+  if (!rules.fleet_prior && paths.empty()) return std::optional<FleetPrior>();
   if (paths.empty()) {
     return failure(ErrorCode::kUsage, "cell {} says prior: fleet, and no robot of its type is named", cell.name)
         .of("--fleet")
@@ -90,9 +89,8 @@ Result<std::optional<FleetPrior>> fleet_prior(const std::vector<std::string>& pa
   }
   std::vector<FleetMember> members;
   for (const std::string& path : paths) {
-    Result<CompensatedModel> model = load_model(path);
-    if (!model) return tl::make_unexpected(model.error());
-    members.push_back({path, std::move(*model)});
+    CompensatedModel model = TRY(load_model(path));
+    members.push_back({path, std::move(model)});
   }
   return learn_fleet_prior(cell.robot, members).map([](FleetPrior prior) { return std::optional(std::move(prior)); });
 }
@@ -156,53 +154,47 @@ Status train_model(const TrainArguments& arguments) {
           .of("--bias")
           .next("trammel help levels tells about kernels");
   }
-  Result<Cell> cell = read_cell_to_train(
-      arguments.cell, {.error_sources = !arguments.level && arguments.from.empty(), .bias = !arguments.bias});
-  if (!cell) return tl::make_unexpected(cell.error());
-  const Result<CheckedBatch> batch =
-      read_checked_batches(arguments.batches, *cell, drawn(arguments.validation_share, arguments.seed));
-  if (!batch) return tl::make_unexpected(batch.error());
+  Cell cell = TRY(read_cell_to_train(
+      arguments.cell, {.error_sources = !arguments.level && arguments.from.empty(), .bias = !arguments.bias}));
+  const CheckedBatch batch =
+      TRY(read_checked_batches(arguments.batches, cell, drawn(arguments.validation_share, arguments.seed)));
   TrainOptions options;
   options.level = arguments.level;
   options.bias = arguments.bias;
   options.seed = arguments.seed;
   options.trained_at = unix_time();
   options.looked_at = arguments.as_read;
-  Result<std::optional<FleetPrior>> fleet = fleet_prior(arguments.fleet, *cell);
-  if (!fleet) return tl::make_unexpected(fleet.error());
-  options.fleet = std::move(*fleet);
+  std::optional<FleetPrior> fleet = TRY(fleet_prior(arguments.fleet, cell));
+  options.fleet = std::move(fleet);
   if (!arguments.from.empty()) {
-    Result<CompensatedModel> from = load_model(arguments.from);
-    if (!from) return tl::make_unexpected(from.error());
-    options.from = std::move(*from);
-    Result<std::vector<std::string>> refit = parse_level(arguments.refit);
-    if (!refit) return tl::make_unexpected(refit.error());
-    options.refit = std::move(*refit);
-    if (const Status fits = hold_against(*options.from, options.refit, *cell, *batch); !fits) return fits;
+    CompensatedModel from = TRY(load_model(arguments.from));
+    options.from = std::move(from);
+    std::vector<std::string> refit = TRY(parse_level(arguments.refit));
+    options.refit = std::move(refit);
+    if (const Status fits = hold_against(*options.from, options.refit, cell, batch); !fits) return fits;
   }
-  const auto shared = std::make_shared<const Cell>(std::move(*cell));
-  if (const Status first = check_first_batch(arguments, shared, *batch); !first) return first;
-  const Result<CompensatedModel> model = [&] {
+  const auto shared = std::make_shared<const Cell>(std::move(cell));
+  if (const Status first = check_first_batch(arguments, shared, batch); !first) return first;
+  const CompensatedModel model = TRY([&] {
     ProgressLine progress;
     options.progress = [&](const std::string& stage, double share) {
       progress.show(stage, share);
       return true;
     };
-    return train(shared, *batch, options);
-  }();
-  if (!model) return tl::make_unexpected(model.error());
-  if (const Status written = write_output(arguments.output, serialize(*model)); !written) return written;
-  const auto& parts = model->parts();
+    return train(shared, batch, options);
+  }());
+  if (const Status written = write_output(arguments.output, serialize(model)); !written) return written;
+  const auto& parts = model.parts();
   const std::vector<Unlike> unlike = options.fleet ? unlike_twins(parts, *options.fleet) : std::vector<Unlike>();
-  const std::optional<Jump> jump = arguments.as_read && !options.from ? jump_beside(*model, *batch) : std::nullopt;
-  tell(model_text(*model) + unlike_text(unlike) + jump_text(jump) +
+  const std::optional<Jump> jump = arguments.as_read && !options.from ? jump_beside(model, batch) : std::nullopt;
+  tell(model_text(model) + unlike_text(unlike) + jump_text(jump) +
            (parts.validation ? fmt::format("on {} poses held out:\n", rows_of(*parts.validation)) +
                                    evaluation_table(*parts.validation)
                              : fmt::format("on the {} poses of batch {} it was trained on (none were held out):\n",
                                            rows_of(parts.training), parts.provenance.figures_batch_id()) +
                                    evaluation_table(parts.training)),
        {arguments.output, arguments.json});
-  nlohmann::ordered_json json = model_json(*model);
+  nlohmann::ordered_json json = model_json(model);
   if (options.fleet) json["unlike_twins"] = unlike_json(unlike);
   if (jump) json["jump"] = jump_json(*jump);
   return write_json(arguments.json, json);
@@ -245,39 +237,35 @@ Status check_outputs(const EvaluateArguments& arguments) {
 
 Status evaluate(const EvaluateArguments& arguments) {
   if (const Status fit = check_outputs(arguments); !fit) return fit;
-  const Result<CompensatedModel> model = load_model(arguments.model);
-  if (!model) return tl::make_unexpected(model.error());
-  const Result<CheckedBatch> batch = read_checked_batches(arguments.batches, model->cell());
-  if (!batch) return tl::make_unexpected(batch.error());
-  const Result<InWorld> world = in_world_of(*model, batch->rows());
-  if (!world) return tl::make_unexpected(world.error());
-  const Evaluation evaluation = model->evaluate(world->batch);
-  const std::vector<Note> notes = notes_of(*model);
+  const CompensatedModel model = TRY(load_model(arguments.model));
+  const CheckedBatch batch = TRY(read_checked_batches(arguments.batches, model.cell()));
+  const InWorld world = TRY(in_world_of(model, batch.rows()));
+  const Evaluation evaluation = model.evaluate(world.batch);
+  const std::vector<Note> notes = notes_of(model);
   warn_of_notes(notes);
-  if (has_gauges(world->batch) && !arguments.residuals.empty() && has_positions(world->batch)) {
+  if (has_gauges(world.batch) && !arguments.residuals.empty() && has_positions(world.batch)) {
     return failure(ErrorCode::kUsage, "residuals of positions and of distances or touches go into two files")
         .of("--residuals")
         .next("evaluate the rows of each kind by themselves");
   }
-  const MeasurementBatch positions = positions_of(world->batch);
-  const CompensatedModel::LevelErrors errors = model->errors_B(positions);
-  const auto learned = std::count_if(world->batch.measurements.begin(), world->batch.measurements.end(),
-                                     LearnedFrom(*model, batch->hash()));
-  const std::string structure = positions.measurements.empty() ? "" : structure_note(*model, positions, errors);
-  tell(fmt::format("model {} on {} poses of {}:\n", model->provenance().id, rows_of(evaluation), batch->id()) +
-           evaluation_table(evaluation) + "the model rests on " + in_words(model->parts().measured, model->cell()) +
-           "\n" + located_text(*world) + learned_text(learned) + (structure.empty() ? "" : "note: " + structure + "\n"),
+  const MeasurementBatch positions = positions_of(world.batch);
+  const CompensatedModel::LevelErrors errors = model.errors_B(positions);
+  const auto learned =
+      std::count_if(world.batch.measurements.begin(), world.batch.measurements.end(), LearnedFrom(model, batch.hash()));
+  const std::string structure = positions.measurements.empty() ? "" : structure_note(model, positions, errors);
+  tell(fmt::format("model {} on {} poses of {}:\n", model.provenance().id, rows_of(evaluation), batch.id()) +
+           evaluation_table(evaluation) + "the model rests on " + in_words(model.parts().measured, model.cell()) +
+           "\n" + located_text(world) + learned_text(learned) + (structure.empty() ? "" : "note: " + structure + "\n"),
        {arguments.json, arguments.residuals});
   if (!arguments.residuals.empty()) {
-    const Status written =
-        write_output(arguments.residuals, has_gauges(world->batch)
-                                              ? gauge_residuals_csv(world->batch, model->gauge_errors(world->batch))
-                                              : residuals_csv(positions, errors));
+    const Status written = write_output(
+        arguments.residuals, has_gauges(world.batch) ? gauge_residuals_csv(world.batch, model.gauge_errors(world.batch))
+                                                     : residuals_csv(positions, errors));
     if (!written) return written;
   }
-  warn_of_foreign_poses(*model, world->batch);
+  warn_of_foreign_poses(model, world.batch);
   nlohmann::ordered_json json = evaluation_json(evaluation);
-  json["measured"] = measured_json(*model);
+  json["measured"] = measured_json(model);
   json["notes"] = notes_json(notes);
   if (!structure.empty()) json["structure"] = structure;
   if (learned > 0) json["trained_on"] = learned;
@@ -289,31 +277,28 @@ struct ReportArguments {
 };
 
 Status report(const ReportArguments& arguments) {
-  const Result<CompensatedModel> model = load_model(arguments.model);
-  if (!model) return tl::make_unexpected(model.error());
+  const CompensatedModel model = TRY(load_model(arguments.model));
   std::optional<MeasurementBatch> batch;
   std::string note;
   if (!arguments.batch.empty()) {
-    const Result<CheckedBatch> checked = read_checked_batches({arguments.batch}, model->cell());
-    if (!checked) return tl::make_unexpected(checked.error());
-    if (const Status positions = require_positions(checked->rows(), "report --batch"); !positions) return positions;
-    Result<InWorld> world = in_world_of(*model, checked->rows());
-    if (!world) return tl::make_unexpected(world.error());
-    const std::size_t learned = std::erase_if(world->batch.measurements, LearnedFrom(*model, checked->hash()));
-    if (!world->batch.measurements.empty()) batch = std::move(world->batch);
+    const CheckedBatch checked = TRY(read_checked_batches({arguments.batch}, model.cell()));
+    if (const Status positions = require_positions(checked.rows(), "report --batch"); !positions) return positions;
+    InWorld world = TRY(in_world_of(model, checked.rows()));
+    const std::size_t learned = std::erase_if(world.batch.measurements, LearnedFrom(model, checked.hash()));
+    if (!world.batch.measurements.empty()) batch = std::move(world.batch);
     if (learned > 0)
       note = fmt::format("note: {} of the {} poses of {} do not judge the model, because it was trained on them\n",
-                         learned, checked->size(), arguments.batch);
+                         learned, checked.size(), arguments.batch);
   }
-  warn_of_notes(notes_of(*model));
-  if (batch) warn_of_foreign_poses(*model, *batch);
+  warn_of_notes(notes_of(model));
+  if (batch) warn_of_foreign_poses(model, *batch);
   if (const Status written =
-          write_output(arguments.output, with_pages_beside(model_page(*model, batch), arguments.output));
+          write_output(arguments.output, with_pages_beside(model_page(model, batch), arguments.output));
       !written)
     return written;
-  tell(note + fmt::format("report of model {} in {}\n", model->provenance().id, arguments.output),
+  tell(note + fmt::format("report of model {} in {}\n", model.provenance().id, arguments.output),
        {arguments.output, arguments.json});
-  return write_json(arguments.json, model_json(*model));
+  return write_json(arguments.json, model_json(model));
 }
 
 void add_train(CLI::App& app, Action& chosen) {

@@ -208,18 +208,16 @@ Status plan(PlanArguments arguments) {
     arguments.options.count = arguments.check;
   }
   arguments.options.orientation = !arguments.positions_only;
-  Result<Cell> read = read_cell_to_train(arguments.cell, {.bias = false});
-  if (!read) return tl::make_unexpected(read.error());
-  const auto cell = std::make_shared<const Cell>(std::move(*read));
+  Cell read = TRY(read_cell_to_train(arguments.cell, {.bias = false}));
+  const auto cell = std::make_shared<const Cell>(std::move(read));
   Result<Plan> planned = arguments.from.empty() ? make_plan(cell, arguments.options) : plan_from(*cell, arguments.from);
   if (!planned) return tl::make_unexpected(planned.error());
   // A batch is measured in the order of the program, so the plan has it, too.
   if (arguments.writes_program() && !arguments.keep_order)
     planned = ordered_for_travel(cell->robot, std::move(*planned));
-  Result<Outputs> outputs = outputs_of(*cell, arguments, *planned);
-  if (!outputs) return tl::make_unexpected(outputs.error());
-  outputs->put("--json", json_text(as_json(*cell, arguments, *planned)));
-  if (const Status written = outputs->write(); !written) return written;
+  Outputs outputs = TRY(outputs_of(*cell, arguments, *planned));
+  outputs.put("--json", json_text(as_json(*cell, arguments, *planned)));
+  if (const Status written = outputs.write(); !written) return written;
   tell(in_words(*cell, arguments, *planned),
        {arguments.output, arguments.rapid, arguments.krl, arguments.fanuc, arguments.urscript, arguments.json});
   return {};

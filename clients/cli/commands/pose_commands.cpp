@@ -34,31 +34,27 @@ Result<Cell> cell_to_simulate(const SimulateArguments& arguments) {
 }
 
 Status simulate_batch(const SimulateArguments& arguments) {
-  Result<Cell> read = cell_to_simulate(arguments);
-  if (!read) return tl::make_unexpected(read.error());
-  const auto cell = std::make_shared<const Cell>(std::move(*read));
-  const Result<VirtualRobot> robot = read_virtual_robot(arguments.truth, cell);
-  if (!robot) return tl::make_unexpected(robot.error());
-  Result<JointList> list = read_joint_file(arguments.plan);
-  if (!list) return tl::make_unexpected(list.error());
+  Cell read = TRY(cell_to_simulate(arguments));
+  const auto cell = std::make_shared<const Cell>(std::move(read));
+  const VirtualRobot robot = TRY(read_virtual_robot(arguments.truth, cell));
+  JointList list = TRY(read_joint_file(arguments.plan));
   std::vector<PoseContext> poses;
-  for (const CommandedPose& pose : list->poses) poses.push_back(pose.context);
+  for (const CommandedPose& pose : list.poses) poses.push_back(pose.context);
   SimulateOptions options;
   options.seed = arguments.seed;
   options.orientation = !arguments.positions_only;
   options.noise = !arguments.noise_free;
   options.tool = arguments.tool;
   options.payload = arguments.payload;
-  Result<MeasurementBatch> batch = simulate(*robot, poses, options);
-  if (!batch) return tl::make_unexpected(batch.error());
-  batch->joint_types = list->joint_types;
-  for (std::size_t i = 0; i < poses.size(); ++i) batch->measurements[i].pose_id = list->poses[i].pose_id;
-  if (const Status written = write_output(arguments.output, to_csv(*batch)); !written) return written;
-  tell(fmt::format("{} measurements in {}\n", batch->measurements.size(), arguments.output),
+  MeasurementBatch batch = TRY(simulate(robot, poses, options));
+  batch.joint_types = list.joint_types;
+  for (std::size_t i = 0; i < poses.size(); ++i) batch.measurements[i].pose_id = list.poses[i].pose_id;
+  if (const Status written = write_output(arguments.output, to_csv(batch)); !written) return written;
+  tell(fmt::format("{} measurements in {}\n", batch.measurements.size(), arguments.output),
        {arguments.output, arguments.json});
   return write_json(arguments.json, {{"cell", cell->name},
-                                     {"poses", batch->measurements.size()},
-                                     {"sigma_mm", to_mm(robot->sigma)},
+                                     {"poses", batch.measurements.size()},
+                                     {"sigma_mm", to_mm(robot.sigma)},
                                      {"seed", arguments.seed}});
 }
 

@@ -37,15 +37,14 @@ PoseContext context_of(const client::CommandedJoints& pose, const Chain& robot, 
 cam::AskPredictions ask_model(const CompensatedModel& model, ProgressLine& progress) {
   return [&](const std::string& asked_tool, const std::string& asked_payload,
              const std::vector<client::CommandedJoints>& poses) -> Result<client::Answer<client::PredictedError>> {
-    const auto known = known_tool_and_payload(model, asked_tool, asked_payload);
-    if (!known) return tl::make_unexpected(known.error());
+    const auto known = TRY(known_tool_and_payload(model, asked_tool, asked_payload));
     client::Answer<client::PredictedError> answer{info_of(model), {}};
     answer.items.resize(poses.size());
     const auto portion = [&](std::size_t k) {
       std::vector<PoseContext> contexts;
       const std::size_t first = k * kPosesTogether, last = std::min(first + kPosesTogether, poses.size());
       for (std::size_t i = first; i < last; ++i)
-        contexts.push_back(context_of(poses[i], model.cell().robot, known->tool, known->payload));
+        contexts.push_back(context_of(poses[i], model.cell().robot, known.tool, known.payload));
       const std::vector<ErrorPrediction> all = model.predict_all(contexts);
       for (std::size_t i = first; i < last; ++i) answer.items[i] = to_wire(all[i - first]);
     };
@@ -56,11 +55,10 @@ cam::AskPredictions ask_model(const CompensatedModel& model, ProgressLine& progr
 }
 
 Result<cam::PredictedProgram> predict_here(const cam::Program& program, const PredictProgramArguments& arguments) {
-  const Result<CompensatedModel> model = load_model(arguments.model);
-  if (!model) return tl::make_unexpected(model.error());
+  const CompensatedModel model = TRY(load_model(arguments.model));
   ProgressLine progress;
-  return cam::predict_program(program, model->cell().robot, tools_of(*model), ask_model(*model, progress),
-                              arguments.tool, arguments.payload);
+  return cam::predict_program(program, model.cell().robot, tools_of(model), ask_model(model, progress), arguments.tool,
+                              arguments.payload);
 }
 
 Result<cam::PredictedProgram> predict_by_service(const cam::Program& program,
@@ -87,25 +85,20 @@ Result<cam::PredictedProgram> predict_by_service(const cam::Program& program,
 }  // namespace
 
 Result<Extent> predict_program(const PredictProgramArguments& arguments) {
-  const Result<ProgramFiles> files = read_program_files(arguments.inputs, arguments.format, arguments.task);
-  if (!files) return tl::make_unexpected(files.error());
+  const ProgramFiles files = TRY(read_program_files(arguments.inputs, arguments.format, arguments.task));
   cam::ReadOptions reading;
   reading.split = true;  // nothing is written, so a point may be used in several ways
   reading.idle_axes = arguments.idle_axes;
   reading.pulses_per_deg = arguments.pulses_per_deg;
-  const Result<cam::Program> program = understood_program(*files, reading, arguments.frames);
-  if (!program) return tl::make_unexpected(program.error());
-  const Result<cam::PredictedProgram> predicted =
-      arguments.service.service ? predict_by_service(*program, arguments) : predict_here(*program, arguments);
-  if (!predicted) return tl::make_unexpected(predicted.error());
-  if (const Status written = write_output(arguments.output, prediction_csv(*predicted)); !written)
-    return tl::make_unexpected(written.error());
-  fmt::print(stderr, "{}", shown_lines(prediction_summary(*predicted)));
+  const cam::Program program = TRY(understood_program(files, reading, arguments.frames));
+  const cam::PredictedProgram predicted =
+      TRY(arguments.service.service ? predict_by_service(program, arguments) : predict_here(program, arguments));
+  TRY(write_output(arguments.output, prediction_csv(predicted)));
+  fmt::print(stderr, "{}", shown_lines(prediction_summary(predicted)));
   if (!arguments.json.empty()) {
-    if (const Status written = write_json(arguments.json, prediction_json(*predicted)); !written)
-      return tl::make_unexpected(written.error());
+    TRY(write_json(arguments.json, prediction_json(predicted)));
   }
-  const bool all = std::none_of(predicted->targets.begin(), predicted->targets.end(), [](const auto& target) {
+  const bool all = std::none_of(predicted.targets.begin(), predicted.targets.end(), [](const auto& target) {
     return target.status == "refused" || target.status == "unreachable";
   });
   return all ? Extent::kAll : Extent::kPart;

@@ -13,15 +13,11 @@ using nlohmann::ordered_json;
 
 /// Its bytes come from outside.
 Result<ordered_json> asked_of_service(const std::string& reference, const ServiceOptions& service) {
-  const Result<ModelReference> model = parse_model_reference(reference);
-  if (!model) return tl::make_unexpected(model.error());
-  const auto session = open_session(service);
-  if (!session) return tl::make_unexpected(session.error());
-  const auto text = (*session)->replay(model->cell, model->version);
-  if (!text) return tl::make_unexpected(text.error());
-  if (const Status small = check_json_limits(*text, "the service's replay"); !small)
-    return tl::make_unexpected(small.error());
-  return ordered_json::parse(*text, nullptr, false);
+  const ModelReference model = TRY(parse_model_reference(reference));
+  const auto session = TRY(open_session(service));
+  const auto text = TRY(session->replay(model.cell, model.version));
+  TRY(check_json_limits(text, "the service's replay"));
+  return ordered_json::parse(text, nullptr, false);
 }
 
 }  // namespace
@@ -30,18 +26,17 @@ Result<double> tell_recent_work(const RecentWorkArguments& arguments, const Serv
   Outputs outputs;
   outputs.add("--next-poses", arguments.next_poses);
   outputs.add("--json", arguments.json);
-  if (const Status good = outputs.check({}); !good) return tl::make_unexpected(good.error());
-  const Result<ordered_json> json = asked_of_service(arguments.model, service);
-  if (!json) return tl::make_unexpected(json.error());
+  TRY(outputs.check({}));
+  const ordered_json json = TRY(asked_of_service(arguments.model, service));
   double differs_mm = 0;
   try {
-    if (!json->at("other").is_null()) differs_mm = json->at("difference").at("max_mm").get<double>();
-    tell(work_text(*json), {arguments.json, arguments.next_poses});
-    if (!json->at("next_poses").empty()) outputs.put("--next-poses", next_poses_csv(*json));
+    if (!json.at("other").is_null()) differs_mm = json.at("difference").at("max_mm").get<double>();
+    tell(work_text(json), {arguments.json, arguments.next_poses});
+    if (!json.at("next_poses").empty()) outputs.put("--next-poses", next_poses_csv(json));
   } catch (const ordered_json::exception& error) {
     return failure(ErrorCode::kInternal, "the service's replay is none: {}", error.what());
   }
-  outputs.put("--json", json_text(*json));
+  outputs.put("--json", json_text(json));
   return outputs.write().map([&] { return differs_mm; });
 }
 

@@ -33,8 +33,7 @@ Result<ErrorBudget> budget_asked(const CompensatedModel& model, const std::strin
   if (!list) return tl::make_unexpected(list.error());
   std::vector<PoseContext> poses;
   for (const CommandedPose& pose : list->poses) {
-    if (const Status fits = model.check_trained_with(pose.context.tool, pose.context.payload); !fits)
-      return tl::make_unexpected(fits.error());
+    TRY(model.check_trained_with(pose.context.tool, pose.context.payload));
     poses.push_back(pose.context);
   }
   return error_budget(model, poses);
@@ -54,21 +53,19 @@ nlohmann::ordered_json remedies_json(const CompensatedModel& model, const ErrorB
 }
 
 Status remedies(const RemediesArguments& arguments) {
-  const Result<CompensatedModel> model = load_model(arguments.model);
-  if (!model) return tl::make_unexpected(model.error());
-  const Result<ErrorBudget> budget = budget_asked(*model, arguments.targets);
-  if (!budget) return tl::make_unexpected(budget.error());
+  const CompensatedModel model = TRY(load_model(arguments.model));
+  const ErrorBudget budget = TRY(budget_asked(model, arguments.targets));
   const std::string where = arguments.targets.empty()
-                                ? fmt::format("{} training poses", budget->poses)
-                                : fmt::format("{} targets of {}", budget->poses, arguments.targets);
-  std::string text = fmt::format("{}, model {}, {}:\n", model->cell().robot.name(), model->provenance().id, where);
-  for (const std::string& line : remedies_in_words(*budget, model->cell().robot)) text += line + "\n";
+                                ? fmt::format("{} training poses", budget.poses)
+                                : fmt::format("{} targets of {}", budget.poses, arguments.targets);
+  std::string text = fmt::format("{}, model {}, {}:\n", model.cell().robot.name(), model.provenance().id, where);
+  for (const std::string& line : remedies_in_words(budget, model.cell().robot)) text += line + "\n";
   tell(text, {arguments.output, arguments.json});
   if (!arguments.output.empty()) {
-    const std::string page = with_pages_beside(remedies_page(*model, *budget, where), arguments.output);
+    const std::string page = with_pages_beside(remedies_page(model, budget, where), arguments.output);
     if (const Status written = write_output(arguments.output, page); !written) return written;
   }
-  return write_json(arguments.json, remedies_json(*model, *budget));
+  return write_json(arguments.json, remedies_json(model, budget));
 }
 
 }  // namespace

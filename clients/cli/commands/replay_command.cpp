@@ -179,16 +179,15 @@ Result<Answers> answered_by(client::Session& session, const ModelReference& mode
 }
 
 Status compare(const RecordedCall& call, const Ask& ask, double tolerance_mm, Replayed& all) {
-  const Result<Answers> now = ask(call);
-  if (!now) return tl::make_unexpected(now.error());
+  const Answers now = TRY(ask(call));
   ++all.requests;
   all.models.insert(fmt::format("{}@{} ({})", call.cell, call.model_version, call.model_hash.substr(0, 8)));
-  all.models_now.insert(now->hash.substr(0, 8));
-  if (now->hash != call.model_hash) ++all.of_other_models;
+  all.models_now.insert(now.hash.substr(0, 8));
+  if (now.hash != call.model_hash) ++all.of_other_models;
   for (std::size_t i = 0; i < call.poses.size(); ++i)
-    note(all, call, i, compared(call.poses[i], now->predictions.at(i)), tolerance_mm);
+    note(all, call, i, compared(call.poses[i], now.predictions.at(i)), tolerance_mm);
   for (std::size_t i = 0; i < call.targets.size(); ++i)
-    note(all, call, i, compared(call.targets[i].answer, now->corrections.at(i)), tolerance_mm);
+    note(all, call, i, compared(call.targets[i].answer, now.corrections.at(i)), tolerance_mm);
   return {};
 }
 
@@ -258,34 +257,30 @@ Result<Extent> replay(const ReplayArguments& arguments) {
   if (arguments.service.service) {
     const Result<ModelReference> model = parse_model_reference(arguments.model);
     if (!model) return tl::make_unexpected(model.error());
-    auto opened = open_session(arguments.service);
-    if (!opened) return tl::make_unexpected(opened.error());
-    session = std::move(*opened);
+    auto opened = TRY(open_session(arguments.service));
+    session = std::move(opened);
     cell = model->cell;
     ask = [&session, model = *model](const RecordedCall& call) { return answered_by(*session, model, call); };
   } else {
-    auto model = load_model(arguments.model);
-    if (!model) return tl::make_unexpected(model.error());
-    here = std::move(*model);
+    auto model = TRY(load_model(arguments.model));
+    here = std::move(model);
     cell = here->cell().name;
     ask = [&here](const RecordedCall& call) { return answered_here(*here, call); };
   }
   Replayed all;
   for (const std::string& input : arguments.inputs) {
-    const auto read = read_records(input, [&](const RecordedCall& call) -> Status {
+    const auto read = TRY(read_records(input, [&](const RecordedCall& call) -> Status {
       if (call.cell == cell) return compare(call, ask, arguments.tolerance_mm, all);
       all.other_cells.insert(call.cell);
       return {};
-    });
-    if (!read) return tl::make_unexpected(read.error());
-    if (read->count > 0) all.damaged.push_back(*read);
-    all.half.insert(all.half.end(), read->half.begin(), read->half.end());
+    }));
+    if (read.count > 0) all.damaged.push_back(read);
+    all.half.insert(all.half.end(), read.half.begin(), read.half.end());
   }
   if (all.requests == 0 && !all.other_cells.empty())
     return refused("no request of cell {}, only of {}", cell, fmt::join(all.other_cells, ", ")).of("cell");
   tell(replayed_text(all, arguments.tolerance_mm), {arguments.json});
-  if (const Status written = write_json(arguments.json, replayed_json(all, arguments.tolerance_mm)); !written)
-    return tl::make_unexpected(written.error());
+  TRY(write_json(arguments.json, replayed_json(all, arguments.tolerance_mm)));
   return !all.damaged.empty() || (arguments.strict && all.different > 0) ? Extent::kPart : Extent::kAll;
 }
 

@@ -31,14 +31,13 @@ Status export_robot(const RobotArguments& arguments) {
   outputs.add("--table", arguments.table);
   outputs.add("--json", arguments.json);
   if (const Status usable = outputs.check({{"--model", arguments.model}}); !usable) return usable;
-  const Result<CompensatedModel> model = load_model(arguments.model);
-  if (!model) return tl::make_unexpected(model.error());
-  const RigidRobot robot = rigid_robot(*model);
-  outputs.put("--output", yaml ? robot_yaml_text(*model, robot) : urdf_text(*model, robot));
-  outputs.put("--table", robot_table(*model, robot));
-  outputs.put("--json", json_text(robot_json(*model, robot)));
+  const CompensatedModel model = TRY(load_model(arguments.model));
+  const RigidRobot robot = rigid_robot(model);
+  outputs.put("--output", yaml ? robot_yaml_text(model, robot) : urdf_text(model, robot));
+  outputs.put("--table", robot_table(model, robot));
+  outputs.put("--json", json_text(robot_json(model, robot)));
   if (const Status written = outputs.write(); !written) return written;
-  tell(fmt::format("robot of model {} in {}\n{}", model->provenance().id, arguments.output, left_out_text(robot)),
+  tell(fmt::format("robot of model {} in {}\n{}", model.provenance().id, arguments.output, left_out_text(robot)),
        {arguments.output, arguments.table, arguments.json});
   return {};
 }

@@ -44,39 +44,36 @@ Extent extent_of(const client::JobStatus& job) {
 /// What a user of the model should know that the job put in force.
 Result<std::vector<Note>> notes_of_made(client::Session& session, const client::JobStatus& job) {
   if (!put_in_force(job)) return std::vector<Note>();
-  const Result<std::vector<client::ModelInfo>> models = session.models(job.cell);
-  if (!models) return tl::make_unexpected(models.error());
-  const auto made = std::find_if(models->begin(), models->end(),
+  const std::vector<client::ModelInfo> models = TRY(session.models(job.cell));
+  const auto made = std::find_if(models.begin(), models.end(),
                                  [&](const client::ModelInfo& model) { return model.version == job.model_version; });
-  return made == models->end() ? std::vector<Note>() : made->notes;
+  return made == models.end() ? std::vector<Note>() : made->notes;
 }
 
 /// Follows a job to its end; a failed one is an error.
 Result<Extent> follow(client::Session& session, std::int64_t job, const ServiceArguments& arguments) {
-  const Result<client::JobStatus> end = [&] {
+  const client::JobStatus end = TRY([&] {
     ProgressLine progress;
     return session.wait_for_job(job, std::chrono::milliseconds(static_cast<std::int64_t>(arguments.limit_s * 1e3)),
                                 [&](const client::JobStatus& status) {
                                   progress.show(fmt::format("job {} {}: {}", status.job, status.stage, status.what),
                                                 status.share);
                                 });
-  }();
-  if (!end) return tl::make_unexpected(end.error());
-  const Result<std::vector<Note>> notes = notes_of_made(session, *end);
-  if (!notes) return tl::make_unexpected(notes.error());
-  ordered_json json = job_json(*end);
-  json["notes"] = notes_json(*notes);
-  if (const Status written = write_json(arguments.json, json); !written) return tl::make_unexpected(written.error());
-  const std::string next = next_step(*end);
-  if (end->stage == "failed" || end->stage == "cancelled") {
-    return refused("job {} of cell {} {}: {}", end->job, end->cell, end->stage, end->what)
+  }());
+  const std::vector<Note> notes = TRY(notes_of_made(session, end));
+  ordered_json json = job_json(end);
+  json["notes"] = notes_json(notes);
+  TRY(write_json(arguments.json, json));
+  const std::string next = next_step(end);
+  if (end.stage == "failed" || end.stage == "cancelled") {
+    return refused("job {} of cell {} {}: {}", end.job, end.cell, end.stage, end.what)
         .of("job")
-        .with_value(end->job)
+        .with_value(end.job)
         .next(next);
   }
-  warn_of_notes(*notes);
-  tell(ended_text(*end) + (next.empty() ? "" : next + "\n"), {arguments.json});
-  return extent_of(*end);
+  warn_of_notes(notes);
+  tell(ended_text(end) + (next.empty() ? "" : next + "\n"), {arguments.json});
+  return extent_of(end);
 }
 
 /// Tells the job's number, or with --watch follows it.
@@ -87,29 +84,24 @@ Result<Extent> started(client::Session& session, std::int64_t job, const Service
 }
 
 Result<Extent> submit(client::Session& session, const ServiceArguments& arguments) {
-  const Result<std::string> cell = cell_id(arguments.cell);
-  if (!cell) return tl::make_unexpected(cell.error());
-  const Result<std::string> csv = read_text_file(arguments.batch);
-  if (!csv) return tl::make_unexpected(csv.error());
-  if (recognise_batch(*csv) == BatchKind::kTrammel) tell_near_columns(*csv, TableKind::kBatch, arguments.batch);
+  const std::string cell = TRY(cell_id(arguments.cell));
+  const std::string csv = TRY(read_text_file(arguments.batch));
+  if (recognise_batch(csv) == BatchKind::kTrammel) tell_near_columns(csv, TableKind::kBatch, arguments.batch);
   const std::string id =
       arguments.batch_id.empty() ? std::filesystem::path(arguments.batch).stem().string() : arguments.batch_id;
-  const Result<std::int64_t> job = session.submit_measurements(*cell, id, *csv);
-  if (!job) return tl::make_unexpected(job.error());
-  return started(session, *job, arguments);
+  const std::int64_t job = TRY(session.submit_measurements(cell, id, csv));
+  return started(session, job, arguments);
 }
 
 Result<Extent> retrain(client::Session& session, const ServiceArguments& arguments) {
-  const Result<std::string> cell = cell_id(arguments.cell);
-  if (!cell) return tl::make_unexpected(cell.error());
+  const std::string cell = TRY(cell_id(arguments.cell));
   if (arguments.release && arguments.batch_ids.empty()) {
     return failure(ErrorCode::kUsage, "--release needs --batch").of("--batch").next("say which one is good");
   }
-  const Result<std::int64_t> job =
-      arguments.release ? session.release_and_train(*cell, arguments.batch_ids, arguments.level, arguments.bias)
-                        : session.train(*cell, arguments.batch_ids, arguments.level, arguments.bias);
-  if (!job) return tl::make_unexpected(job.error());
-  return started(session, *job, arguments);
+  const std::int64_t job =
+      TRY(arguments.release ? session.release_and_train(cell, arguments.batch_ids, arguments.level, arguments.bias)
+                            : session.train(cell, arguments.batch_ids, arguments.level, arguments.bias));
+  return started(session, job, arguments);
 }
 
 bool is_checked(const ordered_json& cell) { return cell.contains("verdict") && cell["verdict"].is_string(); }
@@ -135,36 +127,31 @@ ordered_json fleet_of(const std::vector<ordered_json>& answers) {
 }
 
 Status status(client::Session& session, const ServiceArguments& arguments) {
-  const Result<std::vector<client::ServerStatus>> servers = session.servers();
-  if (!servers) return tl::make_unexpected(servers.error());
-  const Result<std::vector<client::ModelInfo>> models = session.model_status();
-  if (!models) return tl::make_unexpected(models.error());
-  const Result<std::vector<client::BatchOfService>> apart = session.quarantine("");
-  if (!apart) return tl::make_unexpected(apart.error());
-  const Result<std::vector<client::DatedJob>> jobs = session.jobs("");
-  if (!jobs) return tl::make_unexpected(jobs.error());
-  const Result<std::vector<ordered_json>> answers = health_answers(session, "", 1);
-  if (!answers) return tl::make_unexpected(answers.error());
-  const std::vector<ordered_json> health = cells_of(*answers);
+  const std::vector<client::ServerStatus> servers = TRY(session.servers());
+  const std::vector<client::ModelInfo> models = TRY(session.model_status());
+  const std::vector<client::BatchOfService> apart = TRY(session.quarantine(""));
+  const std::vector<client::DatedJob> jobs = TRY(session.jobs(""));
+  const std::vector<ordered_json> answers = TRY(health_answers(session, "", 1));
+  const std::vector<ordered_json> health = cells_of(answers);
   std::string text, checked;
   for (const ordered_json& cell : health) checked += is_checked(cell) ? cell_health_line(cell) : "";
   ordered_json list = ordered_json::array();
-  for (const client::ServerStatus& server : *servers) {
+  for (const client::ServerStatus& server : servers) {
     text += server_text(server);
     list.push_back(server_json(server));
-    list.back().update(part_of(server.server_id, *answers));
+    list.back().update(part_of(server.server_id, answers));
   }
-  const ordered_json record = record_of(*answers);
-  const ordered_json fleet = fleet_of(*answers);
+  const ordered_json record = record_of(answers);
+  const ordered_json fleet = fleet_of(answers);
   text += record_text(record) + servers_text(fleet, record);
-  tell(text + models_text(*models) + checked + jobs_text(*jobs) + quarantine_text(*apart), {arguments.json});
+  tell(text + models_text(models) + checked + jobs_text(jobs) + quarantine_text(apart), {arguments.json});
   return write_json(arguments.json, {{"record", record},
                                      {"servers", list},
                                      {"fleet", fleet},
-                                     {"models", models_json(*models)},
+                                     {"models", models_json(models)},
                                      {"health", health},
-                                     {"jobs", jobs_json(*jobs)},
-                                     {"quarantine", quarantine_json(*apart)}});
+                                     {"jobs", jobs_json(jobs)},
+                                     {"quarantine", quarantine_json(apart)}});
 }
 
 Result<Extent> watch(client::Session& session, const ServiceArguments& arguments) {
@@ -172,47 +159,39 @@ Result<Extent> watch(client::Session& session, const ServiceArguments& arguments
 }
 
 Status list_models(client::Session& session, const ServiceArguments& arguments) {
-  const Result<std::string> cell = cell_id(arguments.cell);
-  if (!cell) return tl::make_unexpected(cell.error());
-  const Result<std::vector<client::ModelInfo>> models = session.models(*cell);
-  if (!models) return tl::make_unexpected(models.error());
-  tell(models_text(*models), {arguments.json});
-  return write_json(arguments.json, {{"cell", *cell}, {"models", models_json(*models)}});
+  const std::string cell = TRY(cell_id(arguments.cell));
+  const std::vector<client::ModelInfo> models = TRY(session.models(cell));
+  tell(models_text(models), {arguments.json});
+  return write_json(arguments.json, {{"cell", cell}, {"models", models_json(models)}});
 }
 
 Status list_jobs(client::Session& session, const ServiceArguments& arguments) {
-  const Result<std::string> cell = arguments.cell.empty() ? Result<std::string>() : cell_id(arguments.cell);
-  if (!cell) return tl::make_unexpected(cell.error());
-  const Result<std::vector<client::DatedJob>> jobs = session.jobs(*cell);
-  if (!jobs) return tl::make_unexpected(jobs.error());
-  tell(all_jobs_text(*jobs), {arguments.json});
-  return write_json(arguments.json, {{"jobs", jobs_json(*jobs)}});
+  const std::string cell = TRY(arguments.cell.empty() ? Result<std::string>() : cell_id(arguments.cell));
+  const std::vector<client::DatedJob> jobs = TRY(session.jobs(cell));
+  tell(all_jobs_text(jobs), {arguments.json});
+  return write_json(arguments.json, {{"jobs", jobs_json(jobs)}});
 }
 
 Status list_batches(client::Session& session, const ServiceArguments& arguments) {
-  const Result<std::string> cell = arguments.cell.empty() ? Result<std::string>() : cell_id(arguments.cell);
-  if (!cell) return tl::make_unexpected(cell.error());
+  const std::string cell = TRY(arguments.cell.empty() ? Result<std::string>() : cell_id(arguments.cell));
   if (arguments.batch_id.empty() != arguments.output.empty())
     return failure(ErrorCode::kUsage, "--batch and --output go together: the batch is written there").of("--batch");
   if (!arguments.batch_id.empty()) {
-    const Result<std::string> csv = session.export_batch(*cell, arguments.batch_id);
-    if (!csv) return tl::make_unexpected(csv.error());
-    return write_output(arguments.output, *csv);
+    const std::string csv = TRY(session.export_batch(cell, arguments.batch_id));
+    return write_output(arguments.output, csv);
   }
-  const Result<std::vector<client::BatchOfService>> batches = session.batches(*cell);
-  if (!batches) return tl::make_unexpected(batches.error());
-  tell(batches_text(*batches), {arguments.json});
-  return write_json(arguments.json, {{"batches", batches_json(*batches)}});
+  const std::vector<client::BatchOfService> batches = TRY(session.batches(cell));
+  tell(batches_text(batches), {arguments.json});
+  return write_json(arguments.json, {{"batches", batches_json(batches)}});
 }
 
 /// The version that the service's record has in force; 0: none. Empty: not among the versions that a list has.
 Result<std::optional<int>> version_in_force(client::Session& session, const std::string& cell) {
-  const Result<std::vector<client::ModelInfo>> models = session.models(cell);
-  if (!models) return tl::make_unexpected(models.error());
-  if (models->empty()) return std::optional(0);
-  const auto in_force = std::find_if(models->begin(), models->end(), [](const auto& model) { return model.in_force; });
-  if (in_force != models->end()) return std::optional(in_force->version);
-  return models->front().version == 1 ? std::optional(0) : std::nullopt;
+  const std::vector<client::ModelInfo> models = TRY(session.models(cell));
+  if (models.empty()) return std::optional(0);
+  const auto in_force = std::find_if(models.begin(), models.end(), [](const auto& model) { return model.in_force; });
+  if (in_force != models.end()) return std::optional(in_force->version);
+  return models.front().version == 1 ? std::optional(0) : std::nullopt;
 }
 
 /// A change that is refused where another version is in force than the user saw or, where that is not said, than there
@@ -223,9 +202,8 @@ Result<client::ChangeOptions> decided_against(client::Session& session, const st
   change.reason = arguments.reason;
   change.expected_version = arguments.expected;
   if (change.expected_version) return change;
-  const auto now = version_in_force(session, cell);
-  if (!now) return tl::make_unexpected(now.error());
-  change.expected_version = *now;
+  const auto now = TRY(version_in_force(session, cell));
+  change.expected_version = now;
   return change;
 }
 
@@ -233,14 +211,12 @@ using BatchChange = Status (client::Session::*)(const std::string&, const std::s
 
 /// `now`: what the batch is afterwards.
 Status change_batch(client::Session& session, const ServiceArguments& arguments, BatchChange change, const char* now) {
-  const Result<std::string> cell = cell_id(arguments.cell);
-  if (!cell) return tl::make_unexpected(cell.error());
-  const Result<client::ChangeOptions> options = decided_against(session, *cell, arguments);
-  if (!options) return tl::make_unexpected(options.error());
+  const std::string cell = TRY(cell_id(arguments.cell));
+  const client::ChangeOptions options = TRY(decided_against(session, cell, arguments));
   const std::string& batch = arguments.batch_id;
-  if (const Status changed = (session.*change)(*cell, batch, *options); !changed) return changed;
-  tell(fmt::format("cell {}: batch {} is {}\n", *cell, batch, now), {arguments.json});
-  return write_json(arguments.json, {{"cell", *cell}, {"batch", batch}, {"is", now}});
+  if (const Status changed = (session.*change)(cell, batch, options); !changed) return changed;
+  tell(fmt::format("cell {}: batch {} is {}\n", cell, batch, now), {arguments.json});
+  return write_json(arguments.json, {{"cell", cell}, {"batch", batch}, {"is", now}});
 }
 
 Status release(client::Session& session, const ServiceArguments& arguments) {
@@ -273,63 +249,49 @@ Status now_in_force(client::Session& session, const std::string& cell, int versi
 }
 
 Status activate(client::Session& session, const ServiceArguments& arguments) {
-  const Result<ModelReference> model = parse_model_reference(arguments.model);
-  if (!model) return tl::make_unexpected(model.error());
-  if (model->version == 0) {
+  const ModelReference model = TRY(parse_model_reference(arguments.model));
+  if (model.version == 0) {
     return failure(ErrorCode::kUsage, "--model '{}': expected cell@version", arguments.model)
         .of("--model")
         .with_text(arguments.model);
   }
-  Result<client::ChangeOptions> options = decided_against(session, model->cell, arguments);
-  if (!options) return tl::make_unexpected(options.error());
-  options->force = arguments.force;
-  const Result<int> version = session.activate(model->cell, model->version, *options);
-  if (!version) return tl::make_unexpected(version.error());
-  return now_in_force(session, model->cell, *version, arguments);
+  client::ChangeOptions options = TRY(decided_against(session, model.cell, arguments));
+  options.force = arguments.force;
+  const int version = TRY(session.activate(model.cell, model.version, options));
+  return now_in_force(session, model.cell, version, arguments);
 }
 
 Status rollback(client::Session& session, const ServiceArguments& arguments) {
-  const Result<std::string> cell = cell_id(arguments.cell);
-  if (!cell) return tl::make_unexpected(cell.error());
-  const Result<client::ChangeOptions> options = decided_against(session, *cell, arguments);
-  if (!options) return tl::make_unexpected(options.error());
-  const Result<int> version = session.rollback(*cell, *options);
-  if (!version) return tl::make_unexpected(version.error());
-  return now_in_force(session, *cell, *version, arguments);
+  const std::string cell = TRY(cell_id(arguments.cell));
+  const client::ChangeOptions options = TRY(decided_against(session, cell, arguments));
+  const int version = TRY(session.rollback(cell, options));
+  return now_in_force(session, cell, version, arguments);
 }
 
 /// What a stored version is, as train tells of a new one.
 Status show_model(client::Session& session, const ServiceArguments& arguments) {
-  const Result<ModelReference> asked = parse_model_reference(arguments.model);
-  if (!asked) return tl::make_unexpected(asked.error());
-  const auto text = session.export_model(asked->cell, asked->version);
-  if (!text) return tl::make_unexpected(text.error());
-  const Result<CompensatedModel> model = deserialize(*text, "the service's model of cell " + asked->cell);
-  if (!model) return tl::make_unexpected(model.error());
-  const auto& judged = model->parts().validation;
-  tell(model_text(*model) + (judged ? evaluation_table(*judged) : ""), {arguments.json});
-  return write_json(arguments.json, model_json(*model));
+  const ModelReference asked = TRY(parse_model_reference(arguments.model));
+  const auto text = TRY(session.export_model(asked.cell, asked.version));
+  const CompensatedModel model = TRY(deserialize(text, "the service's model of cell " + asked.cell));
+  const auto& judged = model.parts().validation;
+  tell(model_text(model) + (judged ? evaluation_table(*judged) : ""), {arguments.json});
+  return write_json(arguments.json, model_json(model));
 }
 
 Status export_model(client::Session& session, const ServiceArguments& arguments) {
-  const Result<ModelReference> model = parse_model_reference(arguments.model);
-  if (!model) return tl::make_unexpected(model.error());
-  const Result<std::string> text = session.export_model(model->cell, model->version);
-  if (!text) return tl::make_unexpected(text.error());
-  if (const Status written = write_output(arguments.output, *text); !written) return written;
-  tell(fmt::format("model of cell {} in {}\n", model->cell, arguments.output), {arguments.output, arguments.json});
-  return write_json(arguments.json, {{"cell", model->cell}, {"file", arguments.output}, {"bytes", text->size()}});
+  const ModelReference model = TRY(parse_model_reference(arguments.model));
+  const std::string text = TRY(session.export_model(model.cell, model.version));
+  if (const Status written = write_output(arguments.output, text); !written) return written;
+  tell(fmt::format("model of cell {} in {}\n", model.cell, arguments.output), {arguments.output, arguments.json});
+  return write_json(arguments.json, {{"cell", model.cell}, {"file", arguments.output}, {"bytes", text.size()}});
 }
 
 Status import_model(client::Session& session, const ServiceArguments& arguments) {
-  const Result<std::string> cell = cell_id(arguments.cell);
-  if (!cell) return tl::make_unexpected(cell.error());
-  const Result<std::string> text = read_text_file(arguments.model);
-  if (!text) return tl::make_unexpected(text.error());
-  const Result<int> version = session.import_model(*cell, *text);
-  if (!version) return tl::make_unexpected(version.error());
-  tell(fmt::format("cell {}: the model is version {}\n", *cell, *version), {arguments.json});
-  return write_json(arguments.json, {{"cell", *cell}, {"version", *version}});
+  const std::string cell = TRY(cell_id(arguments.cell));
+  const std::string text = TRY(read_text_file(arguments.model));
+  const int version = TRY(session.import_model(cell, text));
+  tell(fmt::format("cell {}: the model is version {}\n", cell, version), {arguments.json});
+  return write_json(arguments.json, {{"cell", cell}, {"version", version}});
 }
 
 /// Adds commands that talk to a service.
@@ -348,9 +310,8 @@ class ServiceCommands {
     add_options_of_service_command(*command, arguments->service);
     command->callback([arguments, talk, &chosen = chosen_] {
       chosen = [arguments, talk]() -> std::invoke_result_t<Talk, client::Session&, const ServiceArguments&> {
-        const auto session = open_session(arguments->service);
-        if (!session) return tl::make_unexpected(session.error());
-        return talk(**session, *arguments);
+        const auto session = TRY(open_session(arguments->service));
+        return talk(*session, *arguments);
       };
     });
   }

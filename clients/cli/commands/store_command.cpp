@@ -114,10 +114,9 @@ Status describe(const StoreArguments& arguments) {
     const Status told = describe_cell(arguments.place, arguments.cell, arguments.server, who_asks());
     if (!told) return told;
   }
-  const auto cells = described_cells(arguments.place);
-  if (!cells) return tl::make_unexpected(cells.error());
-  tell(text_of(*cells), {arguments.json});
-  return write_json(arguments.json, {{"place", spoken_place(arguments.place)}, {"cells", json_of(*cells)}});
+  const auto cells = TRY(described_cells(arguments.place));
+  tell(text_of(cells), {arguments.json});
+  return write_json(arguments.json, {{"place", spoken_place(arguments.place)}, {"cells", json_of(cells)}});
 }
 
 using Run = Status (*)(const StoreArguments&);

@@ -17,19 +17,16 @@ struct CpaArguments {
 };
 
 Status cpa(const CpaArguments& arguments) {
-  const Result<Chain> robot = read_robot(arguments.robot);
-  if (!robot) return tl::make_unexpected(robot.error());
-  const Result<ArcList> arcs = read_arcs_csv(arguments.arcs, *robot);
-  if (!arcs) return tl::make_unexpected(arcs.error());
+  const Chain robot = TRY(read_robot(arguments.robot));
+  const ArcList arcs = TRY(read_arcs_csv(arguments.arcs, robot));
   CirclePointOptions options;
   if (arguments.sigma_mm > 0) options.sigma = from_mm(arguments.sigma_mm);
-  const Result<CirclePointResult> result = analyse_circle_points(*robot, *arcs, options);
-  if (!result) return tl::make_unexpected(result.error());
+  const CirclePointResult result = TRY(analyse_circle_points(robot, arcs, options));
   if (!arguments.output.empty()) {
-    if (const Status written = write_output(arguments.output, circle_point_csv(*result)); !written) return written;
+    if (const Status written = write_output(arguments.output, circle_point_csv(result)); !written) return written;
   }
-  tell(circle_point_text(*result), {arguments.output, arguments.json});
-  return write_json(arguments.json, circle_point_json(*result));
+  tell(circle_point_text(result), {arguments.output, arguments.json});
+  return write_json(arguments.json, circle_point_json(result));
 }
 
 struct DeflectionArguments {
@@ -41,13 +38,11 @@ struct DeflectionArguments {
 };
 
 Status deflection(const DeflectionArguments& arguments) {
-  const Result<DeflectionData> data = read_deflection_csv(arguments.data);
-  if (!data) return tl::make_unexpected(data.error());
-  const Result<DeflectionResult> result =
-      fit_deflection(*data, {from_mm(arguments.sigma_mm), arguments.chained, arguments.load_bias, arguments.validate});
-  if (!result) return tl::make_unexpected(result.error());
-  tell(deflection_text(*result), {arguments.json});
-  return write_json(arguments.json, deflection_json(*result));
+  const DeflectionData data = TRY(read_deflection_csv(arguments.data));
+  const DeflectionResult result = TRY(
+      fit_deflection(data, {from_mm(arguments.sigma_mm), arguments.chained, arguments.load_bias, arguments.validate}));
+  tell(deflection_text(result), {arguments.json});
+  return write_json(arguments.json, deflection_json(result));
 }
 
 void add_cpa(CLI::App& app, Action& chosen) {

@@ -27,41 +27,36 @@ std::string shipped_file(const std::string& name) {
 }
 
 Result<VirtualRobot> robot_to_study(const StudyArguments& arguments) {
-  Result<Cell> cell = read_cell(arguments.cell.empty() ? shipped_file("config/cell-7.yaml") : arguments.cell);
-  if (!cell) return tl::make_unexpected(cell.error());
+  Cell cell = TRY(read_cell(arguments.cell.empty() ? shipped_file("config/cell-7.yaml") : arguments.cell));
   return read_virtual_robot(arguments.truth.empty() ? shipped_file("models/truth/chapter-5.yaml") : arguments.truth,
-                            std::make_shared<const Cell>(std::move(*cell)));
+                            std::make_shared<const Cell>(std::move(cell)));
 }
 
 Result<std::vector<TargetRow>> holes_to_drill(const Chain& robot) {
-  Result<TargetFile> file = read_targets_csv(shipped_file("config/drill-panel.csv"));
-  if (!file) return tl::make_unexpected(file.error());
-  if (const Status fits = check_targets(*file, robot); !fits) return tl::make_unexpected(fits.error());
-  return std::move(file->rows);
+  TargetFile file = TRY(read_targets_csv(shipped_file("config/drill-panel.csv")));
+  TRY(check_targets(file, robot));
+  return std::move(file.rows);
 }
 
 Status run(const StudyArguments& arguments) {
-  const Result<VirtualRobot> robot = robot_to_study(arguments);
-  if (!robot) return tl::make_unexpected(robot.error());
+  const VirtualRobot robot = TRY(robot_to_study(arguments));
   StudyOptions options;
   options.seed = arguments.seed;
   options.bias = arguments.bias;
   if (arguments.name == "drilling") {
-    Result<std::vector<TargetRow>> holes = holes_to_drill(robot->truth.cell->robot);
-    if (!holes) return tl::make_unexpected(holes.error());
-    options.holes = std::move(*holes);
+    std::vector<TargetRow> holes = TRY(holes_to_drill(robot.truth.cell->robot));
+    options.holes = std::move(holes);
   }
-  const Result<Study> study = [&] {
+  const Study study = TRY([&] {
     ProgressLine progress;
     options.progress = [&](const std::string& stage, double share) {
       progress.show(stage, share);
       return true;
     };
-    return run_study(arguments.name, *robot, options);
-  }();
-  if (!study) return tl::make_unexpected(study.error());
-  tell(study_text(*study), {arguments.json});
-  return write_json(arguments.json, study_json(*study));
+    return run_study(arguments.name, robot, options);
+  }());
+  tell(study_text(study), {arguments.json});
+  return write_json(arguments.json, study_json(study));
 }
 
 }  // namespace

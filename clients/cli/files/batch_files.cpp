@@ -26,19 +26,17 @@ bool is_model(const std::string& text) { return text.starts_with("{\""); }
 }  // namespace
 
 Result<MeasurementBatch> read_batch_file(const std::string& path) {
-  const Result<std::string> text = read_text_file(path);
-  if (!text) return tl::make_unexpected(text.error());
-  if (is_model(*text)) return refused("this is a model file, not a batch").in(path);
-  Result<MeasurementBatch> batch = parse_batch(*text, path);
-  if (batch && !batch->extra_columns.empty()) tell_near_columns(*text, TableKind::kBatch, path);
+  const std::string text = TRY(read_text_file(path));
+  if (is_model(text)) return refused("this is a model file, not a batch").in(path);
+  Result<MeasurementBatch> batch = parse_batch(text, path);
+  if (batch && !batch->extra_columns.empty()) tell_near_columns(text, TableKind::kBatch, path);
   return std::move(batch).map([&](MeasurementBatch read) { return dated(std::move(read), written_at(path)); });
 }
 
 Result<JointList> read_joint_file(const std::string& path) {
-  const Result<std::string> text = read_text_file(path);
-  if (!text) return tl::make_unexpected(text.error());
-  Result<JointList> list = parse_joint_csv(*text, path);
-  if (list) tell_near_columns(*text, TableKind::kJoints, path);
+  const std::string text = TRY(read_text_file(path));
+  Result<JointList> list = parse_joint_csv(text, path);
+  if (list) tell_near_columns(text, TableKind::kJoints, path);
   return list;
 }
 
@@ -46,9 +44,8 @@ Result<CheckedBatch> read_checked_batches(const std::vector<std::string>& paths,
                                           const HoldOut& hold_out) {
   std::vector<MeasurementBatch> read;
   for (const std::string& path : paths) {
-    Result<MeasurementBatch> batch = read_batch_file(path);
-    if (!batch) return tl::make_unexpected(batch.error());
-    read.push_back(std::move(*batch));
+    MeasurementBatch batch = TRY(read_batch_file(path));
+    read.push_back(std::move(batch));
   }
   tell_apart(read);
   std::vector<CheckedBatch> checked;

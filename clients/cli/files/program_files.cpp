@@ -90,9 +90,8 @@ Result<std::vector<cam::SourceFile>> files_called(const std::set<std::string>& n
   std::error_code error;
   for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
     if (!names.contains(lower(it->path().filename().string())) || !it->is_regular_file(error)) continue;
-    Result<std::string> text = read_text_file(it->path().string(), kLargest);
-    if (!text) return tl::make_unexpected(text.error());
-    found.push_back({fs::relative(it->path(), folder, error).string(), std::move(*text)});
+    std::string text = TRY(read_text_file(it->path().string(), kLargest));
+    found.push_back({fs::relative(it->path(), folder, error).string(), std::move(text)});
   }
   return found;
 }
@@ -111,9 +110,8 @@ std::vector<Found> keep_task(const std::string& task, std::vector<Found>& progra
 
 Status read_into(std::vector<cam::SourceFile>& files, const std::vector<Found>& found) {
   for (const Found& file : found) {
-    Result<std::string> text = read_text_file(file.path, kLargest);
-    if (!text) return tl::make_unexpected(text.error());
-    files.push_back({file.name, std::move(*text)});
+    std::string text = TRY(read_text_file(file.path, kLargest));
+    files.push_back({file.name, std::move(text)});
   }
   return {};
 }
@@ -158,12 +156,11 @@ Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, 
       if (!task.empty()) other_tasks = keep_task(task, inside);
       if (inside.empty())
         return refused("no programs of a task {}", shown(task)).in(input).of("--task").with_text(task);
-      if (const Status read = read_into(program.beside, other_tasks); !read) return tl::make_unexpected(read.error());
+      TRY(read_into(program.beside, other_tasks));
       for (const auto& [names, into] :
            {std::pair(kParameters, &program.parameters), std::pair(kSystemFrames, &program.beside)}) {
-        Result<std::vector<cam::SourceFile>> files = files_called(names, input);
-        if (!files) return tl::make_unexpected(files.error());
-        into->insert(into->end(), files->begin(), files->end());
+        std::vector<cam::SourceFile> files = TRY(files_called(names, input));
+        into->insert(into->end(), files.begin(), files.end());
       }
       found.insert(found.end(), inside.begin(), inside.end());
       for (const Found& file : inside)
@@ -189,9 +186,8 @@ Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, 
     }
     if (!dialect) dialect = own;
     if (!names.insert(file.name).second) return refused("two files of the name {}", file.name).in(file.path);
-    Result<std::string> text = file.path == "-" ? standard_input() : read_text_file(file.path, kLargest);
-    if (!text) return tl::make_unexpected(text.error());
-    program.files.push_back({file.name, std::move(*text)});
+    std::string text = TRY(file.path == "-" ? standard_input() : read_text_file(file.path, kLargest));
+    program.files.push_back({file.name, std::move(text)});
     program.paths.push_back(file.path);
   }
   program.dialect = dialect.value_or(cam::Dialect::kRapid);
@@ -217,31 +213,24 @@ Result<bool> may_be_unused(const CsvTable& table, std::size_t row) {
 }
 
 Result<std::vector<GivenPose>> read_frames_csv(const std::string& path) {
-  const Result<std::string> text = read_text_file(path);
-  if (!text) return tl::make_unexpected(text.error());
-  const Result<CsvTable> table = CsvTable::parse(*text, path);
-  if (!table) return tl::make_unexpected(table.error());
-  const Result<std::size_t> name = table->require("name");
-  if (!name) return tl::make_unexpected(name.error());
-  const auto columns = table->all_or_none({"x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"});
-  if (!columns) return tl::make_unexpected(columns.error());
-  if (columns->empty()) return refused("no columns x_mm,y_mm,z_mm,qw,qx,qy,qz").in(path).of("x_mm");
+  const std::string text = TRY(read_text_file(path));
+  const CsvTable table = TRY(CsvTable::parse(text, path));
+  const std::size_t name = TRY(table.require("name"));
+  const auto columns = TRY(table.all_or_none({"x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"}));
+  if (columns.empty()) return refused("no columns x_mm,y_mm,z_mm,qw,qx,qy,qz").in(path).of("x_mm");
   std::vector<GivenPose> rows;
   std::set<std::string> names;
-  for (std::size_t row = 0; row < table->size(); ++row) {
+  for (std::size_t row = 0; row < table.size(); ++row) {
     Vector3 p;
     for (std::size_t k = 0; k < 3; ++k) {
-      const Result<double> value = table->number(row, (*columns)[k], 1e6);
-      if (!value) return tl::make_unexpected(value.error());
-      p(static_cast<Eigen::Index>(k)) = from_mm(*value);
+      const double value = TRY(table.number(row, columns[k], 1e6));
+      p(static_cast<Eigen::Index>(k)) = from_mm(value);
     }
-    const Result<Matrix3> R = table->rotation(row, {columns->begin() + 3, columns->end()});
-    if (!R) return tl::make_unexpected(R.error());
-    const Result<bool> spare = may_be_unused(*table, row);
-    if (!spare) return tl::make_unexpected(spare.error());
-    rows.push_back({table->field(row, *name), make_pose(*R, p), table->line(row), *spare});
+    const Matrix3 R = TRY(table.rotation(row, {columns.begin() + 3, columns.end()}));
+    const bool spare = TRY(may_be_unused(table, row));
+    rows.push_back({table.field(row, name), make_pose(R, p), table.line(row), spare});
     if (!names.insert(rows.back().name).second)
-      return table->refuse(row, "{} is there twice", shown_short(rows.back().name)).of("name");
+      return table.refuse(row, "{} is there twice", shown_short(rows.back().name)).of("name");
   }
   return rows;
 }
@@ -295,10 +284,9 @@ Status check_pulses(const ProgramFiles& files, const std::vector<double>& pulses
 Result<std::vector<cam::ControllerRobot>> robots_of(const ProgramFiles& files) {
   std::vector<cam::ControllerRobot> robots;
   for (const cam::SourceFile& parameters : files.parameters) {
-    auto robot = cam::read_controller_robot(parameters.text, parameters.name,
-                                            cam::unit_of_task(parameters.text, files.task), "--task says which");
-    if (!robot) return tl::make_unexpected(robot.error());
-    robots.push_back(std::move(*robot));
+    auto robot = TRY(cam::read_controller_robot(parameters.text, parameters.name,
+                                                cam::unit_of_task(parameters.text, files.task), "--task says which"));
+    robots.push_back(std::move(robot));
   }
   return robots;
 }
@@ -307,31 +295,27 @@ Result<std::vector<cam::ControllerRobot>> robots_of(const ProgramFiles& files) {
 
 Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOptions options,
                                         const std::string& frames) {
-  if (const Status told = check_pulses(files, options.pulses_per_deg); !told) return tl::make_unexpected(told.error());
-  const auto robots = robots_of(files);
-  if (!robots) return tl::make_unexpected(robots.error());
-  for (const cam::ControllerRobot& robot : *robots) cam::take_stated(cam::stated_by(robot), options.stated);
+  TRY(check_pulses(files, options.pulses_per_deg));
+  const auto robots = TRY(robots_of(files));
+  for (const cam::ControllerRobot& robot : robots) cam::take_stated(cam::stated_by(robot), options.stated);
   std::vector<GivenPose> rows;
   if (!frames.empty()) {
-    Result<std::vector<GivenPose>> given = read_frames_csv(frames);
-    if (!given) return tl::make_unexpected(given.error());
-    rows = std::move(*given);
+    std::vector<GivenPose> given = TRY(read_frames_csv(frames));
+    rows = std::move(given);
   }
   for (const GivenPose& row : rows) options.frames.emplace(row.name, row.X);
   options.beside = files.beside;
   cam::Program program = cam::read_program(files.dialect, files.files, options);
-  if (const Status whole = cam::check_files(program); !whole) return tl::make_unexpected(whole.error());
-  for (const cam::ControllerRobot& robot : *robots) {
+  TRY(cam::check_files(program));
+  for (const cam::ControllerRobot& robot : robots) {
     if (!robot.carried_by.empty())
       program.notes.push_back(
           fmt::format("{} line {}: {} carries {}, so that where the robot stands is not taken from there", robot.file,
                       robot.line, shown(robot.carried_by), shown(robot.unit)));
   }
-  if (const Status idle = cam::take_idle_axes(program, options.idle_axes); !idle)
-    return tl::make_unexpected(idle.error());
+  TRY(cam::take_idle_axes(program, options.idle_axes));
   if (program.is_understood()) {
-    if (const Status used = check_used(rows, frames, program, files.dialect); !used)
-      return tl::make_unexpected(used.error());
+    TRY(check_used(rows, frames, program, files.dialect));
     return program;
   }
   const bool is_empty = std::all_of(files.files.begin(), files.files.end(),

@@ -132,11 +132,10 @@ Result<std::vector<std::string>> files_of(const std::string& path) {
 }  // namespace
 
 Result<DamagedLines> read_records(const std::string& path, const std::function<Status(const RecordedCall&)>& take) {
-  const auto files = files_of(path);
-  if (!files) return tl::make_unexpected(files.error());
+  const auto files = TRY(files_of(path));
   ReadSoFar read;
-  for (const std::string& file : *files) {
-    if (const Status done = read_file(file, take, read); !done) return tl::make_unexpected(done.error());
+  for (const std::string& file : files) {
+    TRY(read_file(file, take, read));
   }
   if (read.requests == 0 && read.damaged.count > 0) return tl::make_unexpected(read.damaged.first);
   return read.damaged;

@@ -87,9 +87,8 @@ Result<std::vector<double>> numbers(const Columns& columns, std::size_t column, 
   if (unit == "rad" || unit == "m") scale = 1;
   std::vector<double> all;
   for (std::size_t row = 0; row < columns.table().size(); ++row) {
-    const Result<double> value = columns.table().number(row, column);
-    if (!value) return tl::make_unexpected(value.error());
-    all.push_back(scale * *value);
+    const double value = TRY(columns.table().number(row, column));
+    all.push_back(scale * value);
   }
   return all;
 }
@@ -99,9 +98,8 @@ Result<std::vector<Vector3>> vectors(const Columns& columns, const std::array<st
                                      double otherwise) {
   std::vector<Vector3> all(columns.table().size());
   for (std::size_t k = 0; k < 3; ++k) {
-    const Result<std::vector<double>> values = numbers(columns, three[k], otherwise);
-    if (!values) return tl::make_unexpected(values.error());
-    for (std::size_t i = 0; i < all.size(); ++i) all[i](static_cast<Eigen::Index>(k)) = (*values)[i];
+    const std::vector<double> values = TRY(numbers(columns, three[k], otherwise));
+    for (std::size_t i = 0; i < all.size(); ++i) all[i](static_cast<Eigen::Index>(k)) = values[i];
   }
   return all;
 }
@@ -115,9 +113,8 @@ Status read_joints(const Columns& columns, const Chain& robot, ShownPoses& shown
           .in(columns.table().where())
           .of(fmt::format("q{}_deg", j + 1));
     const bool turns = robot.joint(j).type == JointType::kRevolute;
-    const Result<std::vector<double>> values = numbers(columns, *column, turns ? from_deg(1) : from_mm(1));
-    if (!values) return tl::make_unexpected(values.error());
-    for (std::size_t i = 0; i < values->size(); ++i) shown.q[i](j) = (*values)[i];
+    const std::vector<double> values = TRY(numbers(columns, *column, turns ? from_deg(1) : from_mm(1)));
+    for (std::size_t i = 0; i < values.size(); ++i) shown.q[i](j) = values[i];
   }
   if (columns.joint(robot.size() + 1)) {
     return refused("a column of joint {}, and {} has {}", robot.size() + 1, robot.name(), robot.size())
@@ -130,9 +127,8 @@ Status read_joints(const Columns& columns, const Chain& robot, ShownPoses& shown
 Status read_quaternions(const Columns& columns, const std::array<std::size_t, 4>& wxyz, ShownPoses& shown) {
   ShownPoses::Orientations read{"a quaternion", {}};
   for (std::size_t row = 0; row < columns.table().size(); ++row) {
-    const Result<Matrix3> R = columns.table().rotation(row, {wxyz.begin(), wxyz.end()});
-    if (!R) return tl::make_unexpected(R.error());
-    read.R.push_back(*R);
+    const Matrix3 R = TRY(columns.table().rotation(row, {wxyz.begin(), wxyz.end()}));
+    read.R.push_back(R);
   }
   shown.orientations.push_back(std::move(read));
   return {};
@@ -142,15 +138,14 @@ Status read_angles(const Columns& columns, const std::array<std::size_t, 3>& thr
   const bool said = !columns.unit(three[0]).empty();
   for (const double unit : {from_deg(1), 1.0}) {
     if (said && unit == 1.0) break;
-    const Result<std::vector<Vector3>> angles = vectors(columns, three, unit);
-    if (!angles) return tl::make_unexpected(angles.error());
+    const std::vector<Vector3> angles = TRY(vectors(columns, three, unit));
     for (const Meaning& meaning : kMeanings) {
       ShownPoses::Orientations read{
           fmt::format("{} {} {}, {}", columns.table().columns()[three[0]], columns.table().columns()[three[1]],
                       columns.table().columns()[three[2]], meaning.text),
           {}};
       if (!said && unit == 1.0) read.meaning += ", rad";
-      std::transform(angles->begin(), angles->end(), std::back_inserter(read.R), meaning.rotation);
+      std::transform(angles.begin(), angles.end(), std::back_inserter(read.R), meaning.rotation);
       shown.orientations.push_back(std::move(read));
     }
   }
@@ -167,17 +162,15 @@ Status read_orientations(const Columns& columns, ShownPoses& shown) {
 }  // namespace
 
 Result<ShownPoses> parse_shown_poses(const std::string& text, const std::string& where, const Chain& robot) {
-  const Result<CsvTable> table = CsvTable::parse(text, where);
-  if (!table) return tl::make_unexpected(table.error());
-  const Columns columns(*table);
+  const CsvTable table = TRY(CsvTable::parse(text, where));
+  const Columns columns(table);
   ShownPoses shown;
-  if (const Status joints = read_joints(columns, robot, shown); !joints) return tl::make_unexpected(joints.error());
+  TRY(read_joints(columns, robot, shown));
   const auto xyz = columns.all<3>({"x", "y", "z"});
   if (!xyz) return refused("no columns x_mm, y_mm, z_mm of the pose that the controller shows").in(where).of("x_mm");
-  Result<std::vector<Vector3>> positions = vectors(columns, *xyz, from_mm(1));
-  if (!positions) return tl::make_unexpected(positions.error());
-  shown.p = std::move(*positions);
-  if (const Status read = read_orientations(columns, shown); !read) return tl::make_unexpected(read.error());
+  std::vector<Vector3> positions = TRY(vectors(columns, *xyz, from_mm(1)));
+  shown.p = std::move(positions);
+  TRY(read_orientations(columns, shown));
   return shown;
 }
 

@@ -39,11 +39,9 @@ struct TargetColumns {
 };
 
 Result<TargetColumns> find_columns(const CsvTable& table) {
-  Result<PoseColumns> commanded = PoseColumns::find(table);
-  if (!commanded) return tl::make_unexpected(commanded.error());
-  Result<std::vector<std::size_t>> pose = table.all_or_none({"x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"});
-  if (!pose) return tl::make_unexpected(pose.error());
-  TargetColumns columns{std::move(*commanded), std::move(*pose), table.find("conf")};
+  PoseColumns commanded = TRY(PoseColumns::find(table));
+  std::vector<std::size_t> pose = TRY(table.all_or_none({"x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"}));
+  TargetColumns columns{std::move(commanded), std::move(pose), table.find("conf")};
   const bool joints = !columns.commanded.joint_types().empty();
   if (columns.pose.empty() && !joints) {
     return refused("neither a pose (x_mm,y_mm,z_mm,qw,qx,qy,qz) nor joints (q1_deg...)")
@@ -60,9 +58,8 @@ Result<TargetColumns> find_columns(const CsvTable& table) {
 Result<Pose> read_pose(const CsvTable& table, std::size_t row, const std::vector<std::size_t>& columns) {
   Pose X_BT = Pose::Identity();
   for (std::size_t k = 0; k < 3; ++k) {
-    const Result<double> value = table.number(row, columns[k], kPositionLimitMm);
-    if (!value) return tl::make_unexpected(value.error());
-    X_BT.translation()(static_cast<Eigen::Index>(k)) = from_mm(*value);
+    const double value = TRY(table.number(row, columns[k], kPositionLimitMm));
+    X_BT.translation()(static_cast<Eigen::Index>(k)) = from_mm(value);
   }
   return table.rotation(row, {columns.begin() + 3, columns.end()}).map([&](const Matrix3& R_BT) {
     X_BT.linear() = R_BT;
@@ -71,26 +68,22 @@ Result<Pose> read_pose(const CsvTable& table, std::size_t row, const std::vector
 }
 
 Status read_target(const CsvTable& table, std::size_t row, const TargetColumns& columns, Target& target) {
-  Result<PoseContext> comes = columns.commanded.circumstances(table, row);
-  if (!comes) return tl::make_unexpected(comes.error());
-  target.direction = std::move(comes->direction);
-  target.temperature = comes->temperature;
-  target.time = comes->time;
+  PoseContext comes = TRY(columns.commanded.circumstances(table, row));
+  target.direction = std::move(comes.direction);
+  target.temperature = comes.temperature;
+  target.time = comes.time;
   target.joint_target = columns.pose.empty();
   if (!columns.commanded.joint_types().empty() &&
       (target.joint_target || !columns.commanded.joints_empty(table, row))) {
-    Result<JointVector> seed = columns.commanded.joints(table, row);
-    if (!seed) return tl::make_unexpected(seed.error());
-    target.seed = std::move(*seed);
+    JointVector seed = TRY(columns.commanded.joints(table, row));
+    target.seed = std::move(seed);
   }
   if (target.joint_target) return {};
-  const Result<Pose> X_BT = read_pose(table, row, columns.pose);
-  if (!X_BT) return tl::make_unexpected(X_BT.error());
-  target.X_BT = *X_BT;
+  const Pose X_BT = TRY(read_pose(table, row, columns.pose));
+  target.X_BT = X_BT;
   if (columns.conf && !table.field(row, *columns.conf).empty()) {
-    const Result<int> conf = table.integer(row, *columns.conf, 0, kHighestConf);
-    if (!conf) return tl::make_unexpected(conf.error());
-    target.conf = *conf;
+    const int conf = TRY(table.integer(row, *columns.conf, 0, kHighestConf));
+    target.conf = conf;
   }
   if (!target.conf && !target.seed)
     return table.refuse(row, "neither conf nor joints as the seed of the pose").of("conf");
@@ -112,20 +105,16 @@ Status check_not_corrected(const CsvTable& table) {
 }  // namespace
 
 Result<TargetFile> parse_targets_csv(const std::string& text, const std::string& where) {
-  const Result<CsvTable> table = CsvTable::parse(text, where);
-  if (!table) return tl::make_unexpected(table.error());
-  if (const Status fresh = check_not_corrected(*table); !fresh) return tl::make_unexpected(fresh.error());
-  const Result<TargetColumns> columns = find_columns(*table);
-  if (!columns) return tl::make_unexpected(columns.error());
-  if (table->size() == 0) return refused("no targets below the header, at least 1 is needed").in(where).beyond(0, 1);
-  TargetFile file{where, columns->commanded.joint_types(), {}, table->columns()};
-  for (std::size_t row = 0; row < table->size(); ++row) {
+  const CsvTable table = TRY(CsvTable::parse(text, where));
+  TRY(check_not_corrected(table));
+  const TargetColumns columns = TRY(find_columns(table));
+  if (table.size() == 0) return refused("no targets below the header, at least 1 is needed").in(where).beyond(0, 1);
+  TargetFile file{where, columns.commanded.joint_types(), {}, table.columns()};
+  for (std::size_t row = 0; row < table.size(); ++row) {
     TargetRow& target = file.rows.emplace_back();
-    target.row = table->line(row);
-    for (std::size_t k = 0; k < file.columns.size(); ++k) target.fields.push_back(table->field(row, k));
-    if (const Status read = read_target(*table, row, *columns, target.target); !read) {
-      return tl::make_unexpected(read.error());
-    }
+    target.row = table.line(row);
+    for (std::size_t k = 0; k < file.columns.size(); ++k) target.fields.push_back(table.field(row, k));
+    TRY(read_target(table, row, columns, target.target));
   }
   return file;
 }

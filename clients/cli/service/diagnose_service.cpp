@@ -20,9 +20,8 @@ constexpr std::chrono::hours kLongest{1};
 Result<std::int64_t> ask(client::Session& session, const std::string& cell, const DiagnoseArguments& arguments) {
   const std::string batch = arguments.batches.empty() ? "" : arguments.batches.front();
   if (!std::filesystem::exists(batch)) return session.diagnose(cell, batch, "", arguments.apply);
-  const Result<std::string> csv = read_text_file(batch);
-  if (!csv) return tl::make_unexpected(csv.error());
-  return session.diagnose(cell, "", *csv, arguments.apply);
+  const std::string csv = TRY(read_text_file(batch));
+  return session.diagnose(cell, "", csv, arguments.apply);
 }
 
 Result<client::JobStatus> wait(client::Session& session, std::int64_t job) {
@@ -40,7 +39,7 @@ struct Findings {
 
 Result<Findings> findings_of(const std::string& bytes, std::int64_t job) {
   const std::string what = fmt::format("what job {} found", job);
-  if (const Status small = check_json_limits(bytes, what); !small) return tl::make_unexpected(small.error());
+  TRY(check_json_limits(bytes, what));
   Findings findings{ordered_json::parse(bytes, nullptr, false), {}};
   try {
     if (findings.json.is_object()) {
@@ -67,45 +66,36 @@ Result<bool> diagnose_at_service(const DiagnoseArguments& arguments) {
     return failure(ErrorCode::kUsage, "a service diagnoses one batch, {} are named", arguments.batches.size())
         .of("--batch");
   const std::string batch = arguments.batches.empty() ? "" : arguments.batches.front();
-  if (const Status fine = outputs.check({{"--cell", arguments.cell}, {"--batch", batch}}); !fine)
-    return tl::make_unexpected(fine.error());
-  const Result<std::string> cell = cell_id(arguments.cell);
-  if (!cell) return tl::make_unexpected(cell.error());
-  const auto session = open_session(arguments.service);
-  if (!session) return tl::make_unexpected(session.error());
-  const Result<std::int64_t> job = ask(**session, *cell, arguments);
-  if (!job) return tl::make_unexpected(job.error());
-  const Result<client::JobStatus> end = wait(**session, *job);
-  if (!end) return tl::make_unexpected(end.error());
-  if (end->stage == "failed")
-    return refused("job {} of cell {} failed: {}", end->job, end->cell, end->what).of("job").with_value(end->job);
-  auto found = (*session)->diagnosis(*cell, *job, !arguments.report.empty());
-  if (!found) return tl::make_unexpected(found.error());
-  Result<Findings> findings = findings_of(found->findings_json, *job);
-  if (!findings) return tl::make_unexpected(findings.error());
-  ordered_json& json = findings->json;
-  say(findings->text, arguments);
+  TRY(outputs.check({{"--cell", arguments.cell}, {"--batch", batch}}));
+  const std::string cell = TRY(cell_id(arguments.cell));
+  const auto session = TRY(open_session(arguments.service));
+  const std::int64_t job = TRY(ask(*session, cell, arguments));
+  const client::JobStatus end = TRY(wait(*session, job));
+  if (end.stage == "failed")
+    return refused("job {} of cell {} failed: {}", end.job, end.cell, end.what).of("job").with_value(end.job);
+  auto found = TRY(session->diagnosis(cell, job, !arguments.report.empty()));
+  Findings findings = TRY(findings_of(found.findings_json, job));
+  ordered_json& json = findings.json;
+  say(findings.text, arguments);
   if (arguments.apply) {
-    const int now = found->in_force.version;
-    json["applied"] = {{"job", *job},
-                       {"outcome", end->what},
-                       {"version", end->model_version},
-                       {"in_force", end->in_force},
+    const int now = found.in_force.version;
+    json["applied"] = {{"job", job},
+                       {"outcome", end.what},
+                       {"version", end.model_version},
+                       {"in_force", end.in_force},
                        {"version_in_force", now > 0 ? ordered_json(now) : ordered_json(nullptr)},
-                       {"error_sources_in_force", found->in_force.level}};
-    say(fmt::format(
-            "\n{}{}\nin force now: {}\n", end->model_version > 0 ? fmt::format("version {}: ", end->model_version) : "",
-            end->what,
-            now > 0 ? fmt::format("version {} ({})", now, level_in_words(found->in_force.level)) : "no version"),
+                       {"error_sources_in_force", found.in_force.level}};
+    say(fmt::format("\n{}{}\nin force now: {}\n",
+                    end.model_version > 0 ? fmt::format("version {}: ", end.model_version) : "", end.what,
+                    now > 0 ? fmt::format("version {} ({})", now, level_in_words(found.in_force.level)) : "no version"),
         arguments);
   }
-  if (!arguments.report.empty() && found->page_html.empty()) {
+  if (!arguments.report.empty() && found.page_html.empty()) {
     return refused("the service has this page no more").in(arguments.report).of("--report");
   }
-  const Status written = write_diagnosis(json, std::move(found->page_html), outputs, arguments);
-  if (!written) return tl::make_unexpected(written.error());
-  if (!arguments.apply || end->in_force) return true;
-  fmt::print(stderr, "not applied: cell {}: {}\n", *cell, shown_lines(end->what));
+  TRY(write_diagnosis(json, std::move(found.page_html), outputs, arguments));
+  if (!arguments.apply || end.in_force) return true;
+  fmt::print(stderr, "not applied: cell {}: {}\n", cell, shown_lines(end.what));
   return false;
 }
 

@@ -12,8 +12,7 @@ namespace {
 using nlohmann::ordered_json;
 
 Result<ordered_json> answer_in(const std::string& text) {
-  if (const Status small = check_json_limits(text, "the health of cells"); !small)
-    return tl::make_unexpected(small.error());
+  TRY(check_json_limits(text, "the health of cells"));
   ordered_json json = ordered_json::parse(text, nullptr, false);
   if (!json.is_object() || !json.contains("cells") || !json["cells"].is_array())
     return failure(ErrorCode::kInternal, "what the service says of the health of cells has no cells");
@@ -25,13 +24,11 @@ Result<ordered_json> answer_in(const std::string& text) {
 }  // namespace
 
 Result<std::vector<ordered_json>> health_answers(client::Session& session, const std::string& cell, std::size_t most) {
-  const auto texts = session.health(cell, most);
-  if (!texts) return tl::make_unexpected(texts.error());
+  const auto texts = TRY(session.health(cell, most));
   std::vector<ordered_json> answers;
-  for (const std::string& text : *texts) {
-    auto answer = answer_in(text);
-    if (!answer) return tl::make_unexpected(answer.error());
-    answers.push_back(std::move(*answer));
+  for (const std::string& text : texts) {
+    auto answer = TRY(answer_in(text));
+    answers.push_back(std::move(answer));
   }
   return answers;
 }

@@ -7,8 +7,7 @@ namespace trammel::cli {
 cam::CellTools tools_of(const CompensatedModel& model) {
   cam::CellTools cell{model.parts().physics.tools, model.cell().payloads, model.cell().X_WB};
   cell.check_known = [&model](const std::string& tool, const std::string& payload) -> Status {
-    const auto known = known_tool_and_payload(model, tool, payload);
-    if (!known) return tl::make_unexpected(known.error());
+    TRY(known_tool_and_payload(model, tool, payload));
     return {};
   };
   if (cell.X_WB) cell.gravity_B = cell.X_WB->linear().transpose() * model.cell().gravity_W;
@@ -17,13 +16,10 @@ cam::CellTools tools_of(const CompensatedModel& model) {
 
 Result<ToolAndPayload> known_tool_and_payload(const CompensatedModel& model, const std::string& tool,
                                               const std::string& payload) {
-  Result<std::string> known_tool = resolve_tool(model.cell(), tool);
-  if (!known_tool) return tl::make_unexpected(known_tool.error());
-  Result<std::string> known_payload = resolve_payload(model.cell(), payload);
-  if (!known_payload) return tl::make_unexpected(known_payload.error());
-  if (const Status known = model.check_trained_with(*known_tool, *known_payload); !known)
-    return tl::make_unexpected(known.error());
-  return ToolAndPayload{std::move(*known_tool), std::move(*known_payload)};
+  std::string known_tool = TRY(resolve_tool(model.cell(), tool));
+  std::string known_payload = TRY(resolve_payload(model.cell(), payload));
+  TRY(model.check_trained_with(known_tool, known_payload));
+  return ToolAndPayload{std::move(known_tool), std::move(known_payload)};
 }
 
 client::ModelInfo info_of(const CompensatedModel& model) {

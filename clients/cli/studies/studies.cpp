@@ -143,37 +143,30 @@ std::vector<StudyParameter> true_parameters(const PhysicalModel& truth) {
 }
 
 Status run_calibration_study(Laboratory& laboratory, Study& study) {
-  const auto training = laboratory.measure(kCalibrationRanges, kCalibrationPoses, kCalibrationDraw, "calibration");
-  if (!training) return tl::make_unexpected(training.error());
+  const auto training = TRY(laboratory.measure(kCalibrationRanges, kCalibrationPoses, kCalibrationDraw, "calibration"));
   const auto validation =
-      laboratory.measure(kCalibrationRanges, kValidationPoses, kFullRangeValidationDraw, "validation");
-  if (!validation) return tl::make_unexpected(validation.error());
+      TRY(laboratory.measure(kCalibrationRanges, kValidationPoses, kFullRangeValidationDraw, "validation"));
   study.parameters = true_parameters(laboratory.robot().truth);
   for (const std::string& level : kLevels) {
-    const Result<CompensatedModel> model = laboratory.calibrate(level, *training);
-    if (!model) return tl::make_unexpected(model.error());
-    add_calibrated(level, *model, kTraining, *training, study);
-    add_calibrated(level, *model, kValidation, *validation, study);
-    add_parameters(level, *model, study);
+    const CompensatedModel model = TRY(laboratory.calibrate(level, training));
+    add_calibrated(level, model, kTraining, training, study);
+    add_calibrated(level, model, kValidation, validation, study);
+    add_parameters(level, model, study);
   }
   return {};
 }
 
 Status run_bias_study(Laboratory& laboratory, const BiasStudy& spec, Study& study) {
-  const auto calibration = laboratory.measure(kCalibrationRanges, kCalibrationPoses, kCalibrationDraw, "calibration");
-  if (!calibration) return tl::make_unexpected(calibration.error());
-  const auto training = laboratory.measure(spec.ranges, spec.training_poses, kTrainingDraw, study.name);
-  if (!training) return tl::make_unexpected(training.error());
-  const auto validation = laboratory.measure(spec.ranges, kValidationPoses, kValidationDraw, "validation");
-  if (!validation) return tl::make_unexpected(validation.error());
+  const auto calibration =
+      TRY(laboratory.measure(kCalibrationRanges, kCalibrationPoses, kCalibrationDraw, "calibration"));
+  const auto training = TRY(laboratory.measure(spec.ranges, spec.training_poses, kTrainingDraw, study.name));
+  const auto validation = TRY(laboratory.measure(spec.ranges, kValidationPoses, kValidationDraw, "validation"));
   for (const std::string& level : kLevels) {
-    const Result<CompensatedModel> calibrated = laboratory.calibrate(level, *calibration);
-    if (!calibrated) return tl::make_unexpected(calibrated.error());
-    const Result<CompensatedModel> learned = laboratory.learn(level, *calibrated, *training);
-    if (!learned) return tl::make_unexpected(learned.error());
-    for (const auto& [set, batch] : {std::pair{kTraining, &*training}, std::pair{kValidation, &*validation}}) {
-      add_calibrated(level, *calibrated, set, *batch, study);
-      add_learned(level, *learned, set, *batch, study);
+    const CompensatedModel calibrated = TRY(laboratory.calibrate(level, calibration));
+    const CompensatedModel learned = TRY(laboratory.learn(level, calibrated, training));
+    for (const auto& [set, batch] : {std::pair{kTraining, &training}, std::pair{kValidation, &validation}}) {
+      add_calibrated(level, calibrated, set, *batch, study);
+      add_learned(level, learned, set, *batch, study);
     }
   }
   return {};
@@ -182,20 +175,16 @@ Status run_bias_study(Laboratory& laboratory, const BiasStudy& spec, Study& stud
 /// How the learned bias converges with the poses it learns from.
 Status run_training_sizes(Laboratory& laboratory, const std::vector<std::string>& levels, Study& study) {
   const RangesDeg& ranges = kBiasStudies.back().ranges;
-  const auto calibration = laboratory.measure(kCalibrationRanges, kCalibrationPoses, kCalibrationDraw, "calibration");
-  if (!calibration) return tl::make_unexpected(calibration.error());
-  const auto validation = laboratory.measure(ranges, kValidationPoses, kValidationDraw, "validation");
-  if (!validation) return tl::make_unexpected(validation.error());
+  const auto calibration =
+      TRY(laboratory.measure(kCalibrationRanges, kCalibrationPoses, kCalibrationDraw, "calibration"));
+  const auto validation = TRY(laboratory.measure(ranges, kValidationPoses, kValidationDraw, "validation"));
   for (const std::string& level : levels) {
-    const Result<CompensatedModel> calibrated = laboratory.calibrate(level, *calibration);
-    if (!calibrated) return tl::make_unexpected(calibrated.error());
-    add_calibrated(level, *calibrated, kValidation, *validation, study);
+    const CompensatedModel calibrated = TRY(laboratory.calibrate(level, calibration));
+    add_calibrated(level, calibrated, kValidation, validation, study);
     for (std::size_t k = 0; k < kTrainingSizes.size(); ++k) {
-      const auto training = laboratory.measure(ranges, kTrainingSizes[k], kTrainingSizesDraw + k, "training");
-      if (!training) return tl::make_unexpected(training.error());
-      const Result<CompensatedModel> learned = laboratory.learn(level, *calibrated, *training);
-      if (!learned) return tl::make_unexpected(learned.error());
-      add_learned(level, *learned, kValidation, *validation, study);
+      const auto training = TRY(laboratory.measure(ranges, kTrainingSizes[k], kTrainingSizesDraw + k, "training"));
+      const CompensatedModel learned = TRY(laboratory.learn(level, calibrated, training));
+      add_learned(level, learned, kValidation, validation, study);
     }
   }
   return {};
@@ -204,15 +193,12 @@ Status run_training_sizes(Laboratory& laboratory, const std::vector<std::string>
 /// How the complete physical model converges with the poses it is identified from.
 Status run_calibration_sizes(Laboratory& laboratory, const std::string& level, Study& study) {
   const auto validation =
-      laboratory.measure(kCalibrationRanges, kValidationPoses, kFullRangeValidationDraw, "validation");
-  if (!validation) return tl::make_unexpected(validation.error());
+      TRY(laboratory.measure(kCalibrationRanges, kValidationPoses, kFullRangeValidationDraw, "validation"));
   for (std::size_t k = 0; k < kCalibrationSizes.size(); ++k) {
     const auto training =
-        laboratory.measure(kCalibrationRanges, kCalibrationSizes[k], kCalibrationSizesDraw + k, "calibration");
-    if (!training) return tl::make_unexpected(training.error());
-    const Result<CompensatedModel> model = laboratory.calibrate(level, *training);
-    if (!model) return tl::make_unexpected(model.error());
-    add_calibrated(level, *model, "validation, full range", *validation, study);
+        TRY(laboratory.measure(kCalibrationRanges, kCalibrationSizes[k], kCalibrationSizesDraw + k, "calibration"));
+    const CompensatedModel model = TRY(laboratory.calibrate(level, training));
+    add_calibrated(level, model, "validation, full range", validation, study);
   }
   return {};
 }
@@ -234,12 +220,11 @@ Result<InverseResult> nominal_joints(const Cell& cell, const Pose& X_FT, const T
 Result<Eigen::MatrixXd> nominal_joints(const Cell& cell, const Pose& X_FT, const std::vector<TargetRow>& holes) {
   Eigen::MatrixXd q(static_cast<Eigen::Index>(holes.size()), cell.robot.size());
   for (std::size_t i = 0; i < holes.size(); ++i) {
-    const Result<InverseResult> joints = nominal_joints(cell, X_FT, holes[i].target);
-    if (!joints) return tl::make_unexpected(joints.error());
-    if (joints->status != InverseStatus::kOk) {
+    const InverseResult joints = TRY(nominal_joints(cell, X_FT, holes[i].target));
+    if (joints.status != InverseStatus::kOk) {
       return refused("cell {} does not reach it", cell.name).in("holes").at_row(holes[i].row);
     }
-    q.row(static_cast<Eigen::Index>(i)) = joints->q.transpose();
+    q.row(static_cast<Eigen::Index>(i)) = joints.q.transpose();
   }
   return q;
 }
@@ -291,14 +276,13 @@ Status cross_validate(Laboratory& laboratory, const CompensatedModel& nominal, c
     const auto held_out = [&](std::size_t i) { return static_cast<int>(i % kFolds) + 1 == fold; };
     const MeasurementBatch training = part_of(holes, [&](std::size_t i) { return !held_out(i); });
     const MeasurementBatch validation = part_of(holes, held_out);
-    const Result<CompensatedModel> learned = laboratory.learn("M0", nominal, training);
-    if (!learned) return tl::make_unexpected(learned.error());
+    const CompensatedModel learned = TRY(laboratory.learn("M0", nominal, training));
     training_poses = static_cast<int>(training.measurements.size());
     const bool without = !kFoldsLeftOut.contains(fold);
     for (const auto& [batch, all, some] : {std::tuple{&training, &training_errors, &training_without},
                                            std::tuple{&validation, &validation_errors, &validation_without}}) {
       const Eigen::Matrix3Xd calibrated = leftover(nominal.parts().physics, *batch).residual_B.transpose();
-      const Eigen::Matrix3Xd left = left_by_bias(*learned, *batch);
+      const Eigen::Matrix3Xd left = left_by_bias(learned, *batch);
       all->add(calibrated, left);
       if (without) some->add(calibrated, left);
     }
@@ -336,24 +320,19 @@ void drill(const VirtualRobot& robot, const std::string& name, const Compensated
 
 Status run_drilling_study(Laboratory& laboratory, const std::vector<TargetRow>& holes, Study& study) {
   const Cell& cell = *laboratory.cell();
-  const Result<std::string> tool = resolve_tool(cell, "");
-  if (!tool) return tl::make_unexpected(tool.error());
-  const Result<Eigen::MatrixXd> q = nominal_joints(cell, laboratory.robot().truth.tools.at(*tool), holes);
-  if (!q) return tl::make_unexpected(q.error());
-  const auto measured = laboratory.measure(*q, kHolesDraw, "holes");
-  if (!measured) return tl::make_unexpected(measured.error());
-  const auto calibration = laboratory.measure(kCalibrationRanges, kCalibrationPoses, kCalibrationDraw, "calibration");
-  if (!calibration) return tl::make_unexpected(calibration.error());
+  const std::string tool = TRY(resolve_tool(cell, ""));
+  const Eigen::MatrixXd q = TRY(nominal_joints(cell, laboratory.robot().truth.tools.at(tool), holes));
+  const auto measured = TRY(laboratory.measure(q, kHolesDraw, "holes"));
+  const auto calibration =
+      TRY(laboratory.measure(kCalibrationRanges, kCalibrationPoses, kCalibrationDraw, "calibration"));
   for (const std::string level : {"M0", "M3"}) {
-    const Result<CompensatedModel> calibrated = laboratory.calibrate(level, *calibration);
-    if (!calibrated) return tl::make_unexpected(calibrated.error());
+    const CompensatedModel calibrated = TRY(laboratory.calibrate(level, calibration));
     if (level == "M0") {
-      const Status validated = cross_validate(laboratory, *calibrated, *measured, study);
+      const Status validated = cross_validate(laboratory, calibrated, measured, study);
       if (!validated) return validated;
     }
-    const Result<CompensatedModel> learned = laboratory.learn(level, *calibrated, *measured);
-    if (!learned) return tl::make_unexpected(learned.error());
-    drill(laboratory.robot(), level + "+GP", *learned, holes, *measured, study);
+    const CompensatedModel learned = TRY(laboratory.learn(level, calibrated, measured));
+    drill(laboratory.robot(), level + "+GP", learned, holes, measured, study);
   }
   return {};
 }
@@ -388,7 +367,7 @@ Result<Study> run_study(const std::string& name, const VirtualRobot& robot, cons
   Laboratory laboratory(robot, options, steps_of(name));
   const auto bias_study =
       std::find_if(kBiasStudies.begin(), kBiasStudies.end(), [&](const BiasStudy& spec) { return spec.name == name; });
-  const Status done = [&]() -> Status {
+  TRY([&]() -> Status {
     if (bias_study != kBiasStudies.end()) return run_bias_study(laboratory, *bias_study, study);
     if (name == "cal") return run_calibration_study(laboratory, study);
     if (name == "drilling") return run_drilling_study(laboratory, options.holes, study);
@@ -397,8 +376,7 @@ Result<Study> run_study(const std::string& name, const VirtualRobot& robot, cons
         .of("study")
         .with_text(name)
         .next(fmt::format("known are {}", fmt::join(study_names(), ", ")));
-  }();
-  if (!done) return tl::make_unexpected(done.error());
+  }());
   return study;
 }
 

@@ -80,14 +80,13 @@ std::string defaults_path() {
 Result<std::vector<std::string>> with_defaults(const CLI::App& app, std::vector<std::string> words,
                                                const std::string& path) {
   if (path.empty() || words.empty()) return words;
-  const Result<std::vector<Default>> defaults = read_defaults(path);
-  if (!defaults) return tl::make_unexpected(defaults.error());
+  const std::vector<Default> defaults = TRY(read_defaults(path));
   const auto is_command = [&](const CLI::App* one) { return one->get_name() == words[0] && !words[0].empty(); };
   const auto commands = app.get_subcommands(is_command);
   const bool asks_help = says(words, "--help") || says(words, "-h");
   if (commands.empty() || asks_help) return words;
   std::vector<std::string> added;
-  for (const Default& one : *defaults) {
+  for (const Default& one : defaults) {
     const std::string option = "--" + one.name;
     const CLI::Option* known = commands.front()->get_option_no_throw(option);
     if (known == nullptr || says(words, option) || (one.name == "cell" && !known->get_required())) continue;

@@ -352,11 +352,11 @@ Result<ModelParts> parts_from(const Json& content, const Json& stamp, const std:
   if (!physics) return Failure(physics.error()).as(ErrorCode::kRefused).in(where);
   ModelParts parts;
   parts.physics = std::move(*physics);
-  if (const Status read = read_calibration(content, where, parts); !read) return tl::make_unexpected(read.error());
+  TRY(read_calibration(content, where, parts));
   read_domain(content, parts);
   parts.training = evaluation_from(content.at("training"));
-  if (const Status read = read_bias(content, where, parts); !read) return tl::make_unexpected(read.error());
-  if (const Status same = check_angles(content, where, parts); !same) return tl::make_unexpected(same.error());
+  TRY(read_bias(content, where, parts));
+  TRY(check_angles(content, where, parts));
   if (content.contains("validation")) parts.validation = evaluation_from(content.at("validation"));
   if (content.contains("budget")) parts.budget = budget_from(content.at("budget"));
   parts.provenance = provenance_from(content.at("provenance"), stamp);

@@ -120,9 +120,8 @@ Status check_self_test(const CompensatedModel& model, const Json& self_test) {
         .of("self_test")
         .beyond(self_test.size(), kMostPoses);
   for (const Json& one : self_test) {
-    const Result<TestPose> pose = pose_of(one, model);
-    if (!pose) return tl::make_unexpected(pose.error());
-    const ErrorPrediction now = predict(model, *pose);
+    const TestPose pose = TRY(pose_of(one, model));
+    const ErrorPrediction now = predict(model, pose);
     if (!possible(now)) return impossible();
     const auto [off, limit] = worst_of(now, one);
     if (off <= limit) continue;

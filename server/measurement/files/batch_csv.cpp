@@ -37,26 +37,21 @@ struct BatchColumns {
 /// The position, which a batch of gauges may be without.
 Status find_position(const CsvTable& table, BatchColumns& columns) {
   if (columns.has_gauges()) {
-    Result<std::vector<std::size_t>> position = table.all_or_none(kPositionColumns);
-    if (!position) return tl::make_unexpected(position.error());
-    columns.position = std::move(*position);
+    std::vector<std::size_t> position = TRY(table.all_or_none(kPositionColumns));
+    columns.position = std::move(position);
     return {};
   }
   for (const std::string& name : kPositionColumns) {
-    const Result<std::size_t> column = table.require(name);
-    if (!column) return tl::make_unexpected(column.error());
-    columns.position.push_back(*column);
+    const std::size_t column = TRY(table.require(name));
+    columns.position.push_back(column);
   }
   return {};
 }
 
 Result<BatchColumns> find_columns(const CsvTable& table) {
-  Result<PoseColumns> pose = PoseColumns::find(table);
-  if (!pose) return tl::make_unexpected(pose.error());
-  if (const Status has_joints = pose->require_joints(table); !has_joints) {
-    return tl::make_unexpected(has_joints.error());
-  }
-  BatchColumns columns{std::move(*pose),
+  PoseColumns pose = TRY(PoseColumns::find(table));
+  TRY(pose.require_joints(table));
+  BatchColumns columns{std::move(pose),
                        {},
                        {},
                        {},
@@ -67,10 +62,9 @@ Result<BatchColumns> find_columns(const CsvTable& table) {
                        table.find("touch_mm"),
                        table.find("anchor_id"),
                        table.find("minus_pose_id")};
-  if (const Status position = find_position(table, columns); !position) return tl::make_unexpected(position.error());
-  Result<std::vector<std::size_t>> quaternion = table.all_or_none(kQuaternionColumns);
-  if (!quaternion) return tl::make_unexpected(quaternion.error());
-  columns.quaternion = std::move(*quaternion);
+  TRY(find_position(table, columns));
+  std::vector<std::size_t> quaternion = TRY(table.all_or_none(kQuaternionColumns));
+  columns.quaternion = std::move(quaternion);
 
   std::vector<bool> used(table.columns().size(), false);
   for (const std::size_t column : columns.pose.used()) used[column] = true;
@@ -98,14 +92,12 @@ bool says(const CsvTable& table, std::size_t row, const std::optional<std::size_
 
 Status read_position(const CsvTable& table, std::size_t row, const BatchColumns& columns, Measurement& measurement) {
   for (std::size_t k = 0; k < 3; ++k) {
-    const Result<double> value = table.number(row, columns.position[k], kPositionLimitMm);
-    if (!value) return tl::make_unexpected(value.error());
-    measurement.p_W(static_cast<Eigen::Index>(k)) = from_mm(*value);
+    const double value = TRY(table.number(row, columns.position[k], kPositionLimitMm));
+    measurement.p_W(static_cast<Eigen::Index>(k)) = from_mm(value);
   }
   if (!says(table, row, columns.quaternion)) return {};
-  const Result<Matrix3> R_WT = table.rotation(row, columns.quaternion);
-  if (!R_WT) return tl::make_unexpected(R_WT.error());
-  measurement.R_WT = *R_WT;
+  const Matrix3 R_WT = TRY(table.rotation(row, columns.quaternion));
+  measurement.R_WT = R_WT;
   return {};
 }
 
@@ -119,27 +111,23 @@ Result<Gauge> read_gauge(const CsvTable& table, std::size_t row, const BatchColu
     return table.refuse(row, "{} beside a position", name).of(name).next("write a row for each");
   Gauge gauge;
   gauge.kind = distance ? Gauge::Kind::kDistance : Gauge::Kind::kTouch;
-  const Result<double> value = table.number(row, distance ? *columns.distance : *columns.touch, kPositionLimitMm);
-  if (!value) return tl::make_unexpected(value.error());
-  gauge.value = from_mm(*value);
+  const double value = TRY(table.number(row, distance ? *columns.distance : *columns.touch, kPositionLimitMm));
+  gauge.value = from_mm(value);
   if (says(table, row, columns.anchor)) {
-    Result<std::string> anchor = table.name(row, *columns.anchor);
-    if (!anchor) return tl::make_unexpected(anchor.error());
-    gauge.anchor = std::move(*anchor);
+    std::string anchor = TRY(table.name(row, *columns.anchor));
+    gauge.anchor = std::move(anchor);
   }
   if (says(table, row, columns.minus_pose)) gauge.minus_pose = table.field(row, *columns.minus_pose);
   if (distance && gauge.minus_pose.empty() && gauge.value <= 0)
-    return table.refuse(row, "distance_mm is {:g}, must be above 0", *value).of(name).beyond(*value, 0);
+    return table.refuse(row, "distance_mm is {:g}, must be above 0", value).of(name).beyond(value, 0);
   return gauge;
 }
 
 Status read_sigma(const CsvTable& table, std::size_t row, const BatchColumns& columns, Measurement& measurement) {
   if (!says(table, row, columns.sigma)) return {};
-  const Result<double> sigma = table.number(row, *columns.sigma, kSigmaLimitMm);
-  if (!sigma) return tl::make_unexpected(sigma.error());
-  if (*sigma <= 0)
-    return table.refuse(row, "sigma_mm is {:g}, must be above 0", *sigma).of("sigma_mm").beyond(*sigma, 0);
-  measurement.sigma = from_mm(*sigma);
+  const double sigma = TRY(table.number(row, *columns.sigma, kSigmaLimitMm));
+  if (sigma <= 0) return table.refuse(row, "sigma_mm is {:g}, must be above 0", sigma).of("sigma_mm").beyond(sigma, 0);
+  measurement.sigma = from_mm(sigma);
   return {};
 }
 
@@ -149,9 +137,8 @@ Status read_measured(const CsvTable& table, std::size_t row, const BatchColumns&
   if (!gauged && says(table, row, columns.minus_pose))
     return table.refuse(row, "minus_pose_id is told, but neither distance_mm nor touch_mm").of("minus_pose_id");
   if (gauged) {
-    Result<Gauge> gauge = read_gauge(table, row, columns);
-    if (!gauge) return tl::make_unexpected(gauge.error());
-    measurement.gauge = std::move(*gauge);
+    Gauge gauge = TRY(read_gauge(table, row, columns));
+    measurement.gauge = std::move(gauge);
   }
   if (gauged || (columns.has_gauges() && !says(table, row, columns.position))) {
     measurement.p_W.setConstant(std::numeric_limits<double>::quiet_NaN());
@@ -171,19 +158,14 @@ Result<MeasurementSet> read_set(const CsvTable& table, std::size_t row, const st
 
 Result<Measurement> read_measurement(const CsvTable& table, std::size_t row, const BatchColumns& columns) {
   Measurement measurement;
-  Result<PoseContext> context = columns.pose.read(table, row);
-  if (!context) return tl::make_unexpected(context.error());
-  measurement.context = std::move(*context);
-  Result<std::string> pose_id = columns.pose.pose_id(table, row);
-  if (!pose_id) return tl::make_unexpected(pose_id.error());
-  measurement.pose_id = std::move(*pose_id);
+  PoseContext context = TRY(columns.pose.read(table, row));
+  measurement.context = std::move(context);
+  std::string pose_id = TRY(columns.pose.pose_id(table, row));
+  measurement.pose_id = std::move(pose_id);
   measurement.row = table.line(row);
-  if (const Status measured = read_measured(table, row, columns, measurement); !measured) {
-    return tl::make_unexpected(measured.error());
-  }
-  const Result<MeasurementSet> set = read_set(table, row, columns.set);
-  if (!set) return tl::make_unexpected(set.error());
-  measurement.set = *set;
+  TRY(read_measured(table, row, columns, measurement));
+  const MeasurementSet set = TRY(read_set(table, row, columns.set));
+  measurement.set = set;
   if (columns.session) measurement.session_id = table.field(row, *columns.session);
   for (const std::size_t column : columns.extra) measurement.extra.push_back(table.field(row, column));
   return measurement;
@@ -218,31 +200,28 @@ Status settle_gauges(MeasurementBatch& batch, const std::map<std::string, int>& 
 /// The rows of a table whose columns have our names.
 Result<MeasurementBatch> batch_of(const Result<CsvTable>& table, const std::string& text, const std::string& where) {
   if (!table) return tl::make_unexpected(table.error());
-  const Result<BatchColumns> columns = find_columns(*table);
-  if (!columns) return tl::make_unexpected(columns.error());
+  const BatchColumns columns = TRY(find_columns(*table));
   if (table->size() == 0)
     return refused("no measurements below the header, at least 1 is needed").in(where).beyond(0, 1);
   MeasurementBatch batch;
   batch.id = std::filesystem::path(where).stem().string();
   batch.where = where;
-  batch.joint_types = columns->pose.joint_types();
+  batch.joint_types = columns.pose.joint_types();
   batch.source_text = text;
-  for (const std::size_t column : columns->extra) batch.extra_columns.push_back(table->columns()[column]);
+  for (const std::size_t column : columns.extra) batch.extra_columns.push_back(table->columns()[column]);
   std::map<std::string, int> line_of_pose;
   for (std::size_t row = 0; row < table->size(); ++row) {
-    Result<Measurement> measurement = read_measurement(*table, row, *columns);
-    if (!measurement) return tl::make_unexpected(measurement.error());
-    const auto [earlier, is_new] = line_of_pose.emplace(measurement->pose_id, measurement->row);
+    Measurement measurement = TRY(read_measurement(*table, row, columns));
+    const auto [earlier, is_new] = line_of_pose.emplace(measurement.pose_id, measurement.row);
     if (!is_new) {
-      return table->refuse(row, "pose_id '{}' is already that of row {}", measurement->pose_id, earlier->second)
+      return table->refuse(row, "pose_id '{}' is already that of row {}", measurement.pose_id, earlier->second)
           .of("pose_id")
-          .with_text(measurement->pose_id);
+          .with_text(measurement.pose_id);
     }
-    batch.measurements.push_back(std::move(*measurement));
+    batch.measurements.push_back(std::move(measurement));
   }
-  if (columns->has_gauges()) {
-    if (const Status settled = settle_gauges(batch, line_of_pose); !settled)
-      return tl::make_unexpected(settled.error());
+  if (columns.has_gauges()) {
+    TRY(settle_gauges(batch, line_of_pose));
   }
   return batch;
 }
@@ -306,21 +285,18 @@ Result<std::vector<CsvTable::Row>> told_rows(const std::vector<CsvTable::Row>& r
 
 Result<MeasurementBatch> parse_batch_table(const std::string& text, const std::vector<std::string>& columns,
                                            const std::string& where) {
-  const Result<std::vector<TextLine>> lines = text_lines(text, where);
-  if (!lines) return tl::make_unexpected(lines.error());
+  const std::vector<TextLine> lines = TRY(text_lines(text, where));
   const std::vector<TextLine> first = first_lines(text, 1);
   const char separator = first.empty() ? ',' : separator_of(first.front().text);
-  const Result<std::vector<CsvTable::Row>> rows = data_rows(*lines, separator, where);
-  if (!rows) return tl::make_unexpected(rows.error());
+  const std::vector<CsvTable::Row> rows = TRY(data_rows(lines, separator, where));
   std::vector<ToldColumn> told;
   CsvTable::Row header{1, {}};
   for (const std::string& column : columns) {
     told.push_back(told_column(column));
     if (!told.back().name.empty()) header.fields.push_back(told.back().name);
   }
-  const Result<std::vector<CsvTable::Row>> kept = told_rows(*rows, told, where);
-  if (!kept) return tl::make_unexpected(kept.error());
-  return batch_of(CsvTable::from_rows(where, header, *kept, separator), "", where).map([](MeasurementBatch batch) {
+  const std::vector<CsvTable::Row> kept = TRY(told_rows(rows, told, where));
+  return batch_of(CsvTable::from_rows(where, header, kept, separator), "", where).map([](MeasurementBatch batch) {
     batch.source_text = to_csv(batch);
     return batch;
   });

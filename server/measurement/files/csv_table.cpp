@@ -72,9 +72,8 @@ class Scanner {
     CsvTable::Row record;
     record.line = line_;
     while (!text_.empty()) {
-      Result<std::string> field = trimmed_start() == '"' ? quoted() : plain();
-      if (!field) return tl::make_unexpected(field.error());
-      record.fields.push_back(std::move(*field));
+      std::string field = TRY(trimmed_start() == '"' ? quoted() : plain());
+      record.fields.push_back(std::move(field));
       if (record.fields.size() > CsvTable::kMostColumns) break;
       if (text_.empty()) break;
       const char separator = text_.front();
@@ -85,7 +84,7 @@ class Scanner {
       }
       if (text_.empty()) record.fields.emplace_back();  // the file ends with a separator
     }
-    if (const Status fine = check_values(record, where_); !fine) return tl::make_unexpected(fine.error());
+    TRY(check_values(record, where_));
     return record;
   }
 
@@ -218,28 +217,24 @@ Result<CsvTable> CsvTable::parse(std::string_view text, std::string where, std::
   CsvTable table;
   table.where_ = std::move(where);
   table.most_rows_ = most_rows;
-  if (const Status readable = check_is_text(text, table.where_); !readable)
-    return tl::make_unexpected(readable.error());
-  const Result<CsvStart> start = start_of_csv(text, table.where_);
-  if (!start) return tl::make_unexpected(start.error());
-  table.separator_ = start->separator;
-  Scanner scanner(text, *start, table.where_);
-  Result<Row> header = scanner.next();
-  if (!header) return tl::make_unexpected(header.error());
-  if (header->fields.empty())
+  TRY(check_is_text(text, table.where_));
+  const CsvStart start = TRY(start_of_csv(text, table.where_));
+  table.separator_ = start.separator;
+  Scanner scanner(text, start, table.where_);
+  Row header = TRY(scanner.next());
+  if (header.fields.empty())
     return refused("empty file, expected a header line with column names")
         .in(table.where_)
         .beyond(0, 1)
         .next("trammel help formats says which columns");
-  if (const Status set = table.set_columns(std::move(*header)); !set) return tl::make_unexpected(set.error());
+  TRY(table.set_columns(std::move(header)));
   while (true) {
-    Result<Row> record = scanner.next();
-    if (!record) return tl::make_unexpected(record.error());
-    if (record->fields.empty()) break;
-    if (says_nothing(*record)) continue;
-    if (const Status added = table.add_row(std::move(*record)); !added) return tl::make_unexpected(added.error());
+    Row record = TRY(scanner.next());
+    if (record.fields.empty()) break;
+    if (says_nothing(record)) continue;
+    TRY(table.add_row(std::move(record)));
   }
-  if (const Status settled = table.settle_decimals(); !settled) return tl::make_unexpected(settled.error());
+  TRY(table.settle_decimals());
   return table;
 }
 
@@ -248,13 +243,13 @@ Result<CsvTable> CsvTable::from_rows(std::string where, const Row& header, const
   CsvTable table;
   table.where_ = std::move(where);
   table.separator_ = separator;
-  if (const Status set = table.set_columns(header); !set) return tl::make_unexpected(set.error());
+  TRY(table.set_columns(header));
   for (const Row& row : rows) {
-    if (const Status fine = check_values(row, table.where_); !fine) return tl::make_unexpected(fine.error());
+    TRY(check_values(row, table.where_));
     if (says_nothing(row)) continue;
-    if (const Status added = table.add_row(row); !added) return tl::make_unexpected(added.error());
+    TRY(table.add_row(row));
   }
-  if (const Status settled = table.settle_decimals(); !settled) return tl::make_unexpected(settled.error());
+  TRY(table.settle_decimals());
   return table;
 }
 
@@ -409,23 +404,21 @@ Result<double> CsvTable::number(std::size_t row, std::size_t column, double limi
 }
 
 Result<int> CsvTable::integer(std::size_t row, std::size_t column, int lowest, int highest) const {
-  const Result<double> value = number(row, column);
-  if (!value) return tl::make_unexpected(value.error());
-  if (*value != std::floor(*value) || *value < lowest || *value > highest) {
+  const double value = TRY(number(row, column));
+  if (value != std::floor(value) || value < lowest || value > highest) {
     return refuse(row, "{} is {}, expected a whole number from {} to {}", columns_[column],
                   shown_short(field(row, column)), lowest, highest)
         .of(columns_[column])
-        .beyond(*value, *value < lowest ? lowest : highest);
+        .beyond(value, value < lowest ? lowest : highest);
   }
-  return static_cast<int>(*value);
+  return static_cast<int>(value);
 }
 
 Result<Eigen::Matrix3d> CsvTable::rotation(std::size_t row, const std::vector<std::size_t>& wxyz) const {
   Eigen::Vector4d values;
   for (std::size_t k = 0; k < 4; ++k) {
-    const Result<double> value = number(row, wxyz[k]);
-    if (!value) return tl::make_unexpected(value.error());
-    values(static_cast<Eigen::Index>(k)) = *value;
+    const double value = TRY(number(row, wxyz[k]));
+    values(static_cast<Eigen::Index>(k)) = value;
   }
   if (std::abs(values.norm() - 1) > kQuaternionLimit) {
     return refuse(row, "quaternion {},{},{},{} has length {:.6g}, expected 1 (limit {:g})", columns_[wxyz[0]],

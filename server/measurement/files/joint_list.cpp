@@ -10,21 +10,15 @@
 namespace trammel {
 
 Result<JointList> parse_joint_csv(const std::string& text, const std::string& where) {
-  const Result<CsvTable> table = CsvTable::parse(text, where);
-  if (!table) return tl::make_unexpected(table.error());
-  const Result<PoseColumns> columns = PoseColumns::find(*table);
-  if (!columns) return tl::make_unexpected(columns.error());
-  if (const Status has_joints = columns->require_joints(*table); !has_joints) {
-    return tl::make_unexpected(has_joints.error());
-  }
-  if (table->size() == 0) return refused("no poses below the header, at least 1 is needed").in(where).beyond(0, 1);
-  JointList list{where, columns->joint_types(), {}};
-  for (std::size_t row = 0; row < table->size(); ++row) {
-    Result<PoseContext> context = columns->read(*table, row);
-    if (!context) return tl::make_unexpected(context.error());
-    Result<std::string> pose_id = columns->pose_id(*table, row);
-    if (!pose_id) return tl::make_unexpected(pose_id.error());
-    list.poses.push_back({std::move(*pose_id), std::move(*context), table->line(row)});
+  const CsvTable table = TRY(CsvTable::parse(text, where));
+  const PoseColumns columns = TRY(PoseColumns::find(table));
+  TRY(columns.require_joints(table));
+  if (table.size() == 0) return refused("no poses below the header, at least 1 is needed").in(where).beyond(0, 1);
+  JointList list{where, columns.joint_types(), {}};
+  for (std::size_t row = 0; row < table.size(); ++row) {
+    PoseContext context = TRY(columns.read(table, row));
+    std::string pose_id = TRY(columns.pose_id(table, row));
+    list.poses.push_back({std::move(pose_id), std::move(context), table.line(row)});
   }
   return list;
 }
@@ -62,9 +56,7 @@ std::string to_csv(const JointList& list) {
 }
 
 Result<JointList> check_against_cell(JointList list, const Cell& cell) {
-  if (const Status joints = check_joint_columns(list.joint_types, cell.robot, list.where); !joints) {
-    return tl::make_unexpected(joints.error());
-  }
+  TRY(check_joint_columns(list.joint_types, cell.robot, list.where));
   for (CommandedPose& pose : list.poses) {
     const Status checked = check_pose(pose.context, cell);
     if (!checked) return Failure(checked.error()).in(list.where).at_row(pose.row);

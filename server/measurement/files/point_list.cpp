@@ -65,12 +65,10 @@ class PointReader {
     name_ = *table_.find("name");
     for (const std::string& column : coordinate_columns(coordinates_)) position_.push_back(*table_.find(column));
     const CoordinateNames wanted = uncertainty_columns(coordinates_);
-    auto uncertainties = table_.all_or_none({wanted.begin(), wanted.end()});
-    if (!uncertainties) return tl::make_unexpected(uncertainties.error());
-    auto angles = table_.all_or_none({"rx", "ry", "rz"});
-    if (!angles) return tl::make_unexpected(angles.error());
-    uncertainties_ = std::move(*uncertainties);
-    angles_ = std::move(*angles);
+    auto uncertainties = TRY(table_.all_or_none({wanted.begin(), wanted.end()}));
+    auto angles = TRY(table_.all_or_none({"rx", "ry", "rz"}));
+    uncertainties_ = std::move(uncertainties);
+    angles_ = std::move(angles);
     sigma_ = table_.find("sigma");
     return find_beside();
   }
@@ -80,9 +78,8 @@ class PointReader {
   [[nodiscard]] Result<NamedPoint> read(std::size_t row) const {
     NamedPoint point;
     point.row = table_.line(row);
-    Result<std::string> name = table_.name(row, name_);
-    if (!name) return tl::make_unexpected(name.error());
-    point.name = last_component(*name);
+    std::string name = TRY(table_.name(row, name_));
+    point.name = last_component(name);
     if (point.name.empty()) return table_.refuse(row, "name is empty").of("name");
     if (positional_ && is_number(point.name) && point.name.find('.') != std::string::npos) {
       return table_.refuse(row, "name is '{}', which looks like a coordinate", point.name)
@@ -90,17 +87,16 @@ class PointReader {
           .with_text(point.name)
           .next("expected [[collection] group] target first");
     }
-    const Result<Vector3> native = read_three(row, position_, coordinates_, kPositionLimit);
-    if (!native) return tl::make_unexpected(native.error());
-    if (coordinates_ != Coordinates::kCartesian && native->x() < 0) {
-      return table_.refuse(row, "r is {:g}, must not be below 0", native->x() / length_)
+    const Vector3 native = TRY(read_three(row, position_, coordinates_, kPositionLimit));
+    if (coordinates_ != Coordinates::kCartesian && native.x() < 0) {
+      return table_.refuse(row, "r is {:g}, must not be below 0", native.x() / length_)
           .of("r")
-          .beyond(native->x() / length_, 0);
+          .beyond(native.x() / length_, 0);
     }
-    point.p_W = cartesian(*native);
-    if (const Status rotation = read_rotation(row, point); !rotation) return tl::make_unexpected(rotation.error());
-    if (const Status sigma = read_sigma(row, *native, point); !sigma) return tl::make_unexpected(sigma.error());
-    if (const Status u95 = read_u95(row, point); !u95) return tl::make_unexpected(u95.error());
+    point.p_W = cartesian(native);
+    TRY(read_rotation(row, point));
+    TRY(read_sigma(row, native, point));
+    TRY(read_u95(row, point));
     if (time_) point.time = unix_time_of(table_.field(row, *time_));
     for (const std::size_t column : extra_) point.extra.push_back(table_.field(row, column));
     if (time_) point.extra.push_back(point.time ? "" : table_.field(row, *time_));
@@ -110,12 +106,10 @@ class PointReader {
  private:
   /// What the software of trackers writes beside coordinates.
   [[nodiscard]] Status find_beside() {
-    auto quaternion = table_.all_or_none({"qw", "qx", "qy", "qz"});
-    if (!quaternion) return tl::make_unexpected(quaternion.error());
-    auto axes = table_.all_or_none({kU95Axes.begin(), kU95Axes.end()});
-    if (!axes) return tl::make_unexpected(axes.error());
-    quaternion_ = std::move(*quaternion);
-    u95_axes_ = std::move(*axes);
+    auto quaternion = TRY(table_.all_or_none({"qw", "qx", "qy", "qz"}));
+    auto axes = TRY(table_.all_or_none({kU95Axes.begin(), kU95Axes.end()}));
+    quaternion_ = std::move(quaternion);
+    u95_axes_ = std::move(axes);
     u95_ = table_.find(kU95);
     time_ = table_.find(kTimeStamp);
     constexpr std::array kNames = {"air_temperature_c", "air_pressure_hpa", "air_humidity_percent"};
@@ -145,9 +139,8 @@ class PointReader {
                                                                 : std::vector<std::size_t>();
     for (const std::size_t column : columns) {
       if (table_.field(row, column).empty()) return {};
-      const Result<double> sigma = expanded(row, column);
-      if (!sigma) return tl::make_unexpected(sigma.error());
-      square += *sigma * *sigma;
+      const double sigma = TRY(expanded(row, column));
+      square += sigma * sigma;
     }
     if (square > 0) point.sigma = std::sqrt(square / 3);
     return {};
@@ -165,10 +158,8 @@ class PointReader {
       const bool angle =
           (k == 1 && coordinates != Coordinates::kCartesian) || (k == 2 && coordinates == Coordinates::kSpherical);
       const double scale = angle ? angle_ : length_;
-      const Result<double> value =
-          table_.number(row, columns[k], (angle ? from_deg(kAngleLimit) : length_limit) / scale);
-      if (!value) return tl::make_unexpected(value.error());
-      values(static_cast<Eigen::Index>(k)) = *value * scale;
+      const double value = TRY(table_.number(row, columns[k], (angle ? from_deg(kAngleLimit) : length_limit) / scale));
+      values(static_cast<Eigen::Index>(k)) = value * scale;
     }
     return values;
   }
@@ -186,17 +177,15 @@ class PointReader {
     const bool turned = std::any_of(quaternion_.begin(), quaternion_.end(),
                                     [&](std::size_t column) { return !table_.field(row, column).empty(); });
     if (turned) {
-      const Result<Eigen::Matrix3d> R_W = table_.rotation(row, quaternion_);
-      if (!R_W) return tl::make_unexpected(R_W.error());
-      point.R_W = *R_W;
+      const Eigen::Matrix3d R_W = TRY(table_.rotation(row, quaternion_));
+      point.R_W = R_W;
       return {};
     }
     if (angles_.empty()) return {};
     Vector3 angles;
     for (std::size_t k = 0; k < 3; ++k) {
-      const Result<double> value = table_.number(row, angles_[k], from_deg(kAngleLimit) / angle_);
-      if (!value) return tl::make_unexpected(value.error());
-      angles(static_cast<Eigen::Index>(k)) = *value * angle_;
+      const double value = TRY(table_.number(row, angles_[k], from_deg(kAngleLimit) / angle_));
+      angles(static_cast<Eigen::Index>(k)) = value * angle_;
     }
     point.R_W = pose_zyx(Vector3::Zero(), angles.z(), angles.y(), angles.x()).linear();
     return {};
@@ -204,23 +193,20 @@ class PointReader {
 
   [[nodiscard]] Status read_sigma(std::size_t row, const Vector3& native, NamedPoint& point) const {
     if (sigma_ && !table_.field(row, *sigma_).empty()) {
-      const Result<double> sigma = table_.number(row, *sigma_, kUncertaintyLimit / length_);
-      if (!sigma) return tl::make_unexpected(sigma.error());
-      if (*sigma <= 0)
-        return table_.refuse(row, "sigma is {:g}, must be above 0", *sigma).of("sigma").beyond(*sigma, 0);
-      point.sigma = *sigma * length_;
+      const double sigma = TRY(table_.number(row, *sigma_, kUncertaintyLimit / length_));
+      if (sigma <= 0) return table_.refuse(row, "sigma is {:g}, must be above 0", sigma).of("sigma").beyond(sigma, 0);
+      point.sigma = sigma * length_;
     }
     if (uncertainties_.empty()) return {};
-    const Result<Vector3> read = read_three(row, uncertainties_, coordinates_, kUncertaintyLimit);
-    if (!read) return tl::make_unexpected(read.error());
+    const Vector3 read = TRY(read_three(row, uncertainties_, coordinates_, kUncertaintyLimit));
     for (Eigen::Index k = 0; k < 3; ++k) {
-      if ((*read)(k) >= 0) continue;
+      if ((read)(k) >= 0) continue;
       const std::size_t column = uncertainties_[static_cast<std::size_t>(k)];
       return table_.refuse(row, "{} is {}, must not be below 0", table_.columns()[column], table_.field(row, column))
           .of(table_.columns()[column])
           .with_text(table_.field(row, column));
     }
-    Vector3 along = *read;  // m, along the three directions of the coordinates
+    Vector3 along = read;  // m, along the three directions of the coordinates
     if (coordinates_ == Coordinates::kCylindrical) along.y() *= native.x();
     if (coordinates_ == Coordinates::kSpherical) {
       along.y() *= native.x() * std::abs(std::sin(native.z()));
@@ -251,23 +237,21 @@ Result<PointList> parse_points(const std::string& text, const std::string& where
         .in(where)
         .of("coverage")
         .beyond(options.coverage, 0);
-  const Result<PointTable> parts = take_apart(text, where, options);
-  if (!parts) return tl::make_unexpected(parts.error());
-  PointReader reader(*parts, options.coverage);
-  if (const Status found = reader.find_columns(); !found) return tl::make_unexpected(found.error());
+  const PointTable parts = TRY(take_apart(text, where, options));
+  PointReader reader(parts, options.coverage);
+  TRY(reader.find_columns());
   PointList list{where, {}, reader.extra_columns()};
   std::map<std::string, int> row_of_name;
-  for (std::size_t row = 0; row < parts->table.size(); ++row) {
-    Result<NamedPoint> point = reader.read(row);
-    if (!point) return tl::make_unexpected(point.error());
-    const auto [earlier, is_new] = row_of_name.emplace(point->name, point->row);
+  for (std::size_t row = 0; row < parts.table.size(); ++row) {
+    NamedPoint point = TRY(reader.read(row));
+    const auto [earlier, is_new] = row_of_name.emplace(point.name, point.row);
     if (!is_new) {
-      return parts->table.refuse(row, "name '{}' is already that of row {}", point->name, earlier->second)
+      return parts.table.refuse(row, "name '{}' is already that of row {}", point.name, earlier->second)
           .of("name")
-          .with_text(point->name)
+          .with_text(point.name)
           .next("names count without their collection and group: export one group, or rename the point");
     }
-    list.points.push_back(std::move(*point));
+    list.points.push_back(std::move(point));
   }
   return list;
 }
@@ -307,8 +291,7 @@ Status check_as_long(const PointList& points, const JointList& commanded) {
 
 Result<MeasurementBatch> join_points(const PointList& points, const JointList& commanded, bool in_order) {
   if (points.points.empty()) return refused("no points, at least 1 is needed").in(points.where).beyond(0, 1);
-  if (const Status fits = in_order ? check_as_long(points, commanded) : Status(); !fits)
-    return tl::make_unexpected(fits.error());
+  TRY(in_order ? check_as_long(points, commanded) : Status());
   std::map<std::string, const CommandedPose*> pose_of_id;
   for (const CommandedPose& pose : commanded.poses) {
     const auto [earlier, is_new] = pose_of_id.emplace(last_component(pose.pose_id), &pose);

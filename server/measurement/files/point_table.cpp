@@ -59,13 +59,11 @@ Status read_unit_statements(const std::string& comment, const std::string& where
   static const std::regex kUnits(R"((angular|angle)?\s*\bunits?\s*(?:[:=]|\bare\b|\bin\b)\s*([a-z]+))");
   for (auto at = std::sregex_iterator(comment.begin(), comment.end(), kUnits); at != std::sregex_iterator(); ++at) {
     if ((*at)[1].matched) {
-      const Result<bool> radians = is_radian((*at)[2], where, line);
-      if (!radians) return tl::make_unexpected(radians.error());
-      if (const Status s = state(statements.radians, *radians, where, "angular unit"); !s) return s;
+      const bool radians = TRY(is_radian((*at)[2], where, line));
+      if (const Status s = state(statements.radians, radians, where, "angular unit"); !s) return s;
     } else {
-      const Result<LengthUnit> unit = length_unit((*at)[2], where, line);
-      if (!unit) return tl::make_unexpected(unit.error());
-      if (const Status s = state(statements.unit, *unit, where, "unit"); !s) return s;
+      const LengthUnit unit = TRY(length_unit((*at)[2], where, line));
+      if (const Status s = state(statements.unit, unit, where, "unit"); !s) return s;
     }
   }
   return {};
@@ -187,13 +185,11 @@ Status read_header_units(const Header& header, const std::string& where, int lin
   for (std::size_t k = 0; k < header.units.size(); ++k) {
     if (header.units[k].empty()) continue;
     if (is_angle(header.columns[k])) {
-      const Result<bool> radians = is_radian(header.units[k], where, line);
-      if (!radians) return tl::make_unexpected(radians.error());
-      if (const Status s = state(statements.radians, *radians, where, "angular unit"); !s) return s;
+      const bool radians = TRY(is_radian(header.units[k], where, line));
+      if (const Status s = state(statements.radians, radians, where, "angular unit"); !s) return s;
     } else {
-      const Result<LengthUnit> unit = length_unit(header.units[k], where, line);
-      if (!unit) return tl::make_unexpected(unit.error());
-      if (const Status s = state(statements.unit, *unit, where, "unit"); !s) return s;
+      const LengthUnit unit = TRY(length_unit(header.units[k], where, line));
+      if (const Status s = state(statements.unit, unit, where, "unit"); !s) return s;
     }
   }
   return {};
@@ -301,17 +297,15 @@ CoordinateNames uncertainty_columns(Coordinates coordinates) {
 }
 
 Result<PointTable> take_apart(const std::string& text, const std::string& where, const PointFileOptions& options) {
-  const Result<std::vector<TextLine>> read = text_lines(text, where, kLongestLineOfPoints);
-  if (!read) return tl::make_unexpected(read.error());
-  const std::vector<TextLine>& lines = *read;
-  if (const Status few = check_comments(lines, where); !few) return tl::make_unexpected(few.error());
+  const std::vector<TextLine> read = TRY(text_lines(text, where, kLongestLineOfPoints));
+  const std::vector<TextLine>& lines = read;
+  TRY(check_comments(lines, where));
   const auto first = first_of_table(lines);
   if (first == lines.end()) return refused("no points, at least 1 is needed").in(where).beyond(0, 1);
   const char separator = separator_of(first->text);
   PointTable parts{{}, {options.unit, options.coordinates, options.behind, std::nullopt}, false};
-  Result<std::vector<CsvTable::Row>> data = data_rows({first, lines.end()}, separator, where);
-  if (!data) return tl::make_unexpected(data.error());
-  std::vector<CsvTable::Row>& rows = *data;
+  std::vector<CsvTable::Row> data = TRY(data_rows({first, lines.end()}, separator, where));
+  std::vector<CsvTable::Row>& rows = data;
   Header header = header_of(first->text, separator);
   int header_line = first->number;
   if (!header.columns.empty()) rows.erase(rows.begin());
@@ -331,28 +325,25 @@ Result<PointTable> take_apart(const std::string& text, const std::string& where,
   parts.positional = header.columns.empty();
   if (parts.positional) {
     for (CsvTable::Row& row : rows) drop_time_stamp(row.fields);
-    Result<std::vector<std::string>> columns = positional_columns(rows.front(), parts.statements, where);
-    if (!columns) return tl::make_unexpected(columns.error());
+    std::vector<std::string> columns = TRY(positional_columns(rows.front(), parts.statements, where));
     for (const CsvTable::Row& row : rows) {
-      if (row.fields.size() == columns->size()) continue;
-      return refused("{} values, the rows before have {}", row.fields.size(), columns->size())
+      if (row.fields.size() == columns.size()) continue;
+      return refused("{} values, the rows before have {}", row.fields.size(), columns.size())
           .in(where)
           .at_row(row.line)
-          .beyond(row.fields.size(), columns->size());
+          .beyond(row.fields.size(), columns.size());
     }
     if (separator == ',') {
-      if (const Status sure = check_commas(rows, where); !sure) return tl::make_unexpected(sure.error());
+      TRY(check_commas(rows, where));
     }
-    header.columns = std::move(*columns);
+    header.columns = std::move(columns);
     header_line = rows.front().line;
   } else if (const Status units = read_header_units(header, where, header_line, parts.statements); !units) {
     return tl::make_unexpected(units.error());
   }
-  const Status coordinates = state(parts.statements.coordinates, *coordinates_of(header.columns), where, "coordinates");
-  if (!coordinates) return tl::make_unexpected(coordinates.error());
-  Result<CsvTable> table = CsvTable::from_rows(where, {header_line, header.columns}, rows, separator);
-  if (!table) return tl::make_unexpected(table.error());
-  parts.table = std::move(*table);
+  TRY(state(parts.statements.coordinates, *coordinates_of(header.columns), where, "coordinates"));
+  CsvTable table = TRY(CsvTable::from_rows(where, {header_line, header.columns}, rows, separator));
+  parts.table = std::move(table);
   return parts;
 }
 

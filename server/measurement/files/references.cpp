@@ -43,7 +43,7 @@ Result<ReferenceCheck> check_references(const PointList& references, const Point
                    to_mm(options.localise_above), to_mm(options.repeat_above))
         .beyond(to_mm(options.localise_above), to_mm(options.repeat_above));
   }
-  if (const Status names = check_names(references, measured); !names) return tl::make_unexpected(names.error());
+  TRY(check_names(references, measured));
   ReferenceCheck check;
   Eigen::Matrix3Xd p_W(3, static_cast<Eigen::Index>(references.points.size()));
   Eigen::Matrix3Xd p_V = p_W;

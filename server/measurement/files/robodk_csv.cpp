@@ -84,12 +84,10 @@ class NamedColumns {
   }
 
   [[nodiscard]] Result<RoboDkColumns> find() {
-    if (const Status joints = find_joints(); !joints) return tl::make_unexpected(joints.error());
-    if (const Status position = find_three({"x", "y", "z"}, "mm", found_.position); !position) {
-      return tl::make_unexpected(position.error());
-    }
+    TRY(find_joints());
+    TRY(find_three({"x", "y", "z"}, "mm", found_.position));
     if (found_.position.empty()) return tl::make_unexpected(table_.require("X").error());
-    if (const Status orientation = find_orientation(); !orientation) return tl::make_unexpected(orientation.error());
+    TRY(find_orientation());
     for (const char* name : {"poseid", "id", "name", "point", "target"}) {
       if (!found_.pose_id) found_.pose_id = find_name(name);
     }
@@ -127,9 +125,8 @@ class NamedColumns {
             .in(table_.where())
             .of(fmt::format("J{}", found_.joints.size() + 1));
       }
-      const Result<ScaledColumn> joint = scaled(table_, column, "deg");
-      if (!joint) return tl::make_unexpected(joint.error());
-      found_.joints.push_back(*joint);
+      const ScaledColumn joint = TRY(scaled(table_, column, "deg"));
+      found_.joints.push_back(joint);
       used_.push_back(column);
     }
     return {};
@@ -145,14 +142,13 @@ class NamedColumns {
       }
       const auto column = find_name(name);
       if (!column) continue;
-      const Result<ScaledColumn> one = scaled(table_, *column, unit);
-      if (!one) return tl::make_unexpected(one.error());
-      if (one->angle != (unit == "deg")) {
+      const ScaledColumn one = TRY(scaled(table_, *column, unit));
+      if (one.angle != (unit == "deg")) {
         return refused("column {} is a length, expected deg or rad", table_.columns()[*column])
             .in(table_.where())
             .of(table_.columns()[*column]);
       }
-      columns.push_back(*one);
+      columns.push_back(one);
     }
     if (columns.size() == 1 || columns.size() == 2) {
       return refused("{} of the columns {}; they come all together or not at all", columns.size(),
@@ -247,11 +243,10 @@ Result<RoboDkTable> take_apart(const std::string& text, const std::string& where
   const std::vector<TextLine> first = first_lines(text, 1);
   if (first.empty()) return refused("empty file, expected joints and measured positions").in(where);
   const char separator = separator_of(first.front().text);
-  Result<std::vector<CsvTable::Row>> read = text_lines(text, where).and_then([&](const std::vector<TextLine>& lines) {
+  std::vector<CsvTable::Row> read = TRY(text_lines(text, where).and_then([&](const std::vector<TextLine>& lines) {
     return data_rows(lines, separator, where);
-  });
-  if (!read) return tl::make_unexpected(read.error());
-  std::vector<CsvTable::Row>& rows = *read;
+  }));
+  std::vector<CsvTable::Row>& rows = read;
   CsvTable::Row header = rows.front();
   const bool has_header = !std::all_of(header.fields.begin(), header.fields.end(), [&](const std::string& field) {
     return is_number(separator == ',' ? field : with_decimal_point(field));
@@ -270,7 +265,7 @@ Result<RoboDkTable> take_apart(const std::string& text, const std::string& where
           .at_row(header.line);
     }
     if (separator == ',' && !has_header) {
-      if (const Status sure = check_commas(rows, where); !sure) return tl::make_unexpected(sure.error());
+      TRY(check_commas(rows, where));
     }
   }
   return CsvTable::from_rows(where, header, rows, separator).map([&](CsvTable table) {
@@ -293,9 +288,8 @@ Result<double> read_scaled(const CsvTable& table, std::size_t row, const ScaledC
 Result<Vector3> read_three(const CsvTable& table, std::size_t row, const std::vector<ScaledColumn>& columns) {
   Vector3 values;
   for (std::size_t k = 0; k < 3; ++k) {
-    const Result<double> value = read_scaled(table, row, columns[k], 2 * kPi);
-    if (!value) return tl::make_unexpected(value.error());
-    values(static_cast<Eigen::Index>(k)) = *value;
+    const double value = TRY(read_scaled(table, row, columns[k], 2 * kPi));
+    values(static_cast<Eigen::Index>(k)) = value;
   }
   return values;
 }
@@ -317,22 +311,18 @@ Result<std::optional<Matrix3>> read_rotation(const CsvTable& table, std::size_t 
 Result<Measurement> read_measurement(const CsvTable& table, std::size_t row, const RoboDkColumns& columns) {
   Measurement measurement;
   measurement.row = table.line(row);
-  Result<std::string> pose_id = columns.pose_id ? table.name(row, *columns.pose_id) : std::string();
-  if (!pose_id) return tl::make_unexpected(pose_id.error());
-  measurement.pose_id = pose_id->empty() ? fmt::format("{}", row + 1) : std::move(*pose_id);
+  std::string pose_id = TRY(columns.pose_id ? table.name(row, *columns.pose_id) : std::string());
+  measurement.pose_id = pose_id.empty() ? fmt::format("{}", row + 1) : std::move(pose_id);
   measurement.context.index = static_cast<int>(row);
   measurement.context.q.resize(static_cast<Eigen::Index>(columns.joints.size()));
   for (std::size_t j = 0; j < columns.joints.size(); ++j) {
-    const Result<double> value = read_scaled(table, row, columns.joints[j], kTurnsLimit * 2 * kPi);
-    if (!value) return tl::make_unexpected(value.error());
-    measurement.context.q(static_cast<Eigen::Index>(j)) = *value;
+    const double value = TRY(read_scaled(table, row, columns.joints[j], kTurnsLimit * 2 * kPi));
+    measurement.context.q(static_cast<Eigen::Index>(j)) = value;
   }
-  const Result<Vector3> position = read_three(table, row, columns.position);
-  if (!position) return tl::make_unexpected(position.error());
-  measurement.p_W = *position;
-  Result<std::optional<Matrix3>> rotation = read_rotation(table, row, columns);
-  if (!rotation) return tl::make_unexpected(rotation.error());
-  measurement.R_WT = *rotation;
+  const Vector3 position = TRY(read_three(table, row, columns.position));
+  measurement.p_W = position;
+  std::optional<Matrix3> rotation = TRY(read_rotation(table, row, columns));
+  measurement.R_WT = rotation;
   for (const std::size_t column : columns.extra) measurement.extra.push_back(table.field(row, column));
   return measurement;
 }
@@ -343,9 +333,8 @@ Status name_tools(const CsvTable& table, const std::vector<std::size_t>& tcp, Me
   for (std::size_t row = 0; row < table.size(); ++row) {
     std::vector<double> tool;
     for (const std::size_t column : tcp) {
-      const Result<double> value = table.number(row, column);
-      if (!value) return tl::make_unexpected(value.error());
-      tool.push_back(*value);
+      const double value = TRY(table.number(row, column));
+      tool.push_back(value);
     }
     const std::size_t number = tools.emplace(std::move(tool), tools.size() + 1).first->second;
     batch.measurements[row].context.tool = fmt::format("tcp-{}", number);
@@ -358,33 +347,28 @@ Status name_tools(const CsvTable& table, const std::vector<std::size_t>& tcp, Me
 }  // namespace
 
 Result<MeasurementBatch> parse_robodk_csv(const std::string& text, const std::string& where) {
-  const Result<RoboDkTable> parts = take_apart(text, where);
-  if (!parts) return tl::make_unexpected(parts.error());
-  const Result<RoboDkColumns> columns = find_columns(*parts);
-  if (!columns) return tl::make_unexpected(columns.error());
+  const RoboDkTable parts = TRY(take_apart(text, where));
+  const RoboDkColumns columns = TRY(find_columns(parts));
   MeasurementBatch batch;
   batch.id = std::filesystem::path(where).stem().string();
   batch.where = where;
   batch.source_text = text;
-  batch.extra_columns = columns->extra_names;
-  for (const ScaledColumn& joint : columns->joints) {
+  batch.extra_columns = columns.extra_names;
+  for (const ScaledColumn& joint : columns.joints) {
     batch.joint_types.push_back(joint.angle ? JointType::kRevolute : JointType::kPrismatic);
   }
   std::map<std::string, int> row_of_pose;
-  for (std::size_t row = 0; row < parts->table.size(); ++row) {
-    Result<Measurement> measurement = read_measurement(parts->table, row, *columns);
-    if (!measurement) return tl::make_unexpected(measurement.error());
-    const auto [earlier, is_new] = row_of_pose.emplace(measurement->pose_id, measurement->row);
+  for (std::size_t row = 0; row < parts.table.size(); ++row) {
+    Measurement measurement = TRY(read_measurement(parts.table, row, columns));
+    const auto [earlier, is_new] = row_of_pose.emplace(measurement.pose_id, measurement.row);
     if (!is_new) {
-      return parts->table.refuse(row, "pose_id '{}' is already that of row {}", measurement->pose_id, earlier->second)
+      return parts.table.refuse(row, "pose_id '{}' is already that of row {}", measurement.pose_id, earlier->second)
           .of("pose_id")
-          .with_text(measurement->pose_id);
+          .with_text(measurement.pose_id);
     }
-    batch.measurements.push_back(std::move(*measurement));
+    batch.measurements.push_back(std::move(measurement));
   }
-  if (const Status tools = name_tools(parts->table, columns->tcp, batch); !tools) {
-    return tl::make_unexpected(tools.error());
-  }
+  TRY(name_tools(parts.table, columns.tcp, batch));
   return batch;
 }
 

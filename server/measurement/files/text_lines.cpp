@@ -66,7 +66,7 @@ class LineReader {
 }  // namespace
 
 Result<std::vector<TextLine>> text_lines(std::string_view text, const std::string& where, std::size_t longest) {
-  if (const Status readable = check_is_text(text, where); !readable) return tl::make_unexpected(readable.error());
+  TRY(check_is_text(text, where));
   std::vector<TextLine> lines;
   std::size_t data = 0;
   for (LineReader reader(text); const auto line = reader.next();) {
