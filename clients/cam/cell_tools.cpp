@@ -5,18 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/letters.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
 
 namespace trammel::cam {
 
 namespace {
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-  return text;
-}
 
 double distance(const Pose& a, const Pose& b) { return (a.translation() - b.translation()).norm(); }
 double angle(const Pose& a, const Pose& b) { return pose_difference(a, b).tail<3>().norm(); }

@@ -12,6 +12,7 @@
 #include "clients/cam/stated_robot.h"
 #include "clients/cam/tables/tables.h"
 #include "clients/cam/urscript/urscript.h"
+#include "server/base/letters.h"
 
 namespace trammel::cam {
 
@@ -83,9 +84,7 @@ const char* name_of(Dialect dialect) {
 std::optional<Dialect> dialect_of_file(const std::string& path) {
   const std::size_t dot = path.rfind('.');
   if (dot == std::string::npos) return std::nullopt;
-  std::string ending = path.substr(dot);
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  const std::string ending = lower(path.substr(dot));
   for (const Entry& entry : entries()) {
     if (std::find(entry.endings.begin(), entry.endings.end(), ending) != entry.endings.end()) return entry.dialect;
   }

@@ -6,14 +6,13 @@
 #include <cmath>
 
 #include "server/base/check.h"
+#include "server/base/letters.h"
 
 namespace trammel::cam {
 
 namespace {
 
 constexpr int kMostDecimals = 10;
-
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 std::size_t digits_at(std::string_view text, std::size_t from) {
   std::size_t at = from;

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "server/base/letters.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
 
@@ -20,11 +21,6 @@ bool is_utf16(const std::string& text) {
   if (text.size() < 4) return false;
   const auto zeros = [&](std::size_t first) { return text[first] == '\0' && text[first + 2] == '\0'; };
   return zeros(0) != zeros(1);
-}
-
-std::string lower(std::string text) {
-  for (char& c : text) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
-  return text;
 }
 
 double near_turn(double angle, double like) { return angle + 360 * std::round((like - angle) / 360); }

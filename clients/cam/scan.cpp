@@ -1,10 +1,11 @@
 #include "clients/cam/scan.h"
 
+#include "server/base/letters.h"
+
 namespace trammel::cam {
 
 namespace {
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_letter(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || c == '$' ||
          static_cast<unsigned char>(c) >= 0x80;

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "clients/cam/number_text.h"
+#include "server/base/letters.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
 #include "server/robot/inverse_kinematics.h"
@@ -120,11 +121,6 @@ std::string digits_behind(const std::string& type, const std::string& letters, s
     if (whole && end - first >= fewest) return type.substr(first, end - first);
   }
   return "";
-}
-
-std::string upper(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-  return text;
 }
 
 /// ABB's number of a model: 6640 of `ROB1_6640_2.75_205`.

@@ -6,6 +6,7 @@
 #include <map>
 #include <vector>
 
+#include "server/base/median.h"
 #include "server/base/units.h"
 #include "server/calibrate/calibration.h"
 #include "server/calibrate/frames/localisation.h"
@@ -50,12 +51,6 @@ struct Reading {
 };
 
 double angle(const Quaternion& a, const Quaternion& b) { return a.angularDistance(b); }
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double rms(const std::vector<double>& values) {
   double sum = 0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "server/base/median.h"
 #include "server/base/units.h"
 #include "server/calibrate/batch_check.h"
 #include "server/compensate/known_rows.h"
@@ -11,12 +12,6 @@
 namespace trammel {
 
 namespace {
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double median_length(const Eigen::Matrix3Xd& vectors) {
   std::vector<double> lengths;

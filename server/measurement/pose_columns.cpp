@@ -5,6 +5,7 @@
 #include <map>
 #include <string_view>
 
+#include "server/base/letters.h"
 #include "server/base/units.h"
 
 namespace trammel {
@@ -21,8 +22,7 @@ struct JointColumn {
 
 /// `q12_deg`, `Q12_DEG` -> 12, revolute; nothing for any other name.
 std::optional<JointColumn> as_joint_column(std::string_view column_name) {
-  std::string name(column_name);
-  for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  const std::string name = lower(column_name);
   if (!name.starts_with('q')) return std::nullopt;
   JointColumn column;
   const auto [end, error] = std::from_chars(name.data() + 1, name.data() + name.size(), column.number);

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "server/base/letters.h"
 #include "server/base/units.h"
 
 namespace trammel {
@@ -142,11 +143,6 @@ class FanucText {
   std::string lines_, positions_;
   int count_ = 0, position_ = 0;
 };
-
-std::string upper(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-  return text;
-}
 
 std::string script_motion(const Axes& axes, const JointVector& q, double speed) {
   std::vector<std::string> values;

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cctype>
 
+#include "server/base/letters.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/base/yaml_file.h"
@@ -15,7 +16,7 @@ std::string key_of(const Parameter& parameter) {
   std::string unit;  // as a key: `rad/Nmm` is `rad_per_nmm`
   for (const char c : parameter.unit) {
     if (c == '/') unit += "_per_";
-    if (std::isalnum(static_cast<unsigned char>(c)) != 0) unit += static_cast<char>(std::tolower(c));
+    if (std::isalnum(static_cast<unsigned char>(c)) != 0) unit += lower(c);
   }
   return unit.empty() ? parameter.name : parameter.name + "_" + unit;
 }

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "server/base/letters.h"
 #include "server/store/statements.h"
 
 namespace trammel {
@@ -27,8 +28,8 @@ std::string listed(const std::vector<std::string>& names) { return fmt::format("
 int waits_for(const std::string& standby_names) {
   const std::size_t bracket = standby_names.find('(');
   if (bracket == std::string::npos) return 1;
-  const auto digit = std::find_if(standby_names.begin(), standby_names.begin() + static_cast<std::ptrdiff_t>(bracket),
-                                  [](unsigned char c) { return std::isdigit(c) != 0; });
+  const auto digit =
+      std::find_if(standby_names.begin(), standby_names.begin() + static_cast<std::ptrdiff_t>(bracket), is_digit);
   return std::max(1, std::atoi(std::string(digit, standby_names.end()).c_str()));
 }
 

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "clients/cam/number_text.h"
+#include "server/base/letters.h"
 
 namespace trammel::cam::fanuc {
 
@@ -19,11 +20,6 @@ constexpr std::string_view kKnown =
     "UNLOCK SOFTFLOAT MP TORQ_LIMIT STOP_TRACKING VISION TIMER VOFFSET LINE SYNC JOINT_MAX_SPEED "
     "LINEAR_MAX_SPEED FORCE SENSOR DIAG POINT_LOGIC LINECOUNT TOOL_OFFSET_CONDITION CLEAR TC_ONLINE "
     "RESET PULSE RETURN ";
-
-std::string in_capitals(std::string text) {
-  for (char& c : text) c = static_cast<char>(c >= 'a' && c <= 'z' ? c - 'a' + 'A' : c);
-  return text;
-}
 
 /// Without comments of points and registers, `P[1:don't]`, and without texts: words in them mean nothing.
 Pieces without_comments(const Pieces& pieces) {
@@ -97,10 +93,10 @@ std::string name_of_program(const SourceFile& source) {
   const std::size_t head = text.find("/PROG");
   const std::size_t end = head == std::string::npos ? 0 : std::min(text.find('\n', head), text.size());
   const Pieces pieces = head == std::string::npos ? Pieces{} : pieces_of(text, head, end, 1, {"", ""});
-  if (pieces.size() > 2) return in_capitals(std::string(pieces[2].text));
+  if (pieces.size() > 2) return upper(std::string(pieces[2].text));
   const std::string& file = source.name;
   const std::size_t folder = file.rfind('/') + 1;
-  return in_capitals(file.substr(folder, file.rfind('.') - std::min(folder, file.rfind('.'))));
+  return upper(file.substr(folder, file.rfind('.') - std::min(folder, file.rfind('.'))));
 }
 
 std::vector<Pieces> statements_of(const std::string& text, const Part& part) {
@@ -182,7 +178,7 @@ Step step_of(const Pieces& statement) {
 
 std::string called_by(const Pieces& statement) {
   for (std::size_t at = 0; at + 1 < statement.size(); ++at) {
-    if (statement[at].is("CALL")) return in_capitals(std::string(statement[at + 1].text));
+    if (statement[at].is("CALL")) return upper(std::string(statement[at + 1].text));
   }
   return "";
 }

@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "clients/cam/number_text.h"
+#include "server/base/letters.h"
 
 namespace trammel::cam::krl {
 
@@ -11,13 +12,10 @@ namespace {
 
 constexpr int kDeepest = 8;  // brackets within brackets
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_letter(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || c == '$' ||
          static_cast<unsigned char>(c) >= 0x80;
 }
-char upper(char c) { return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c; }
-
 std::size_t number_end(std::string_view text, std::size_t at) {
   const auto digit = [&](std::size_t i) { return i < text.size() && is_digit(text[i]); };
   while (digit(at)) ++at;

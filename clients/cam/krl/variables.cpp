@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "clients/cam/number_text.h"
+#include "server/base/letters.h"
 #include "server/base/plain_text.h"
 
 namespace trammel::cam::krl {
@@ -22,13 +23,6 @@ bool is_equal(const std::vector<Value>& a, const std::vector<Value>& b) {
 }
 
 }  // namespace
-
-std::string upper(std::string text) {
-  for (char& c : text) {
-    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
-  }
-  return text;
-}
 
 std::string stem_of(const std::string& name) { return upper(name.substr(0, name.rfind('.'))); }
 

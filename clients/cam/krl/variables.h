@@ -11,6 +11,7 @@
 
 #include "clients/cam/krl/lines.h"
 #include "clients/cam/program.h"
+#include "server/base/letters.h"
 
 /// What the names of a KRL program stand for.
 namespace trammel::cam::krl {
@@ -36,7 +37,6 @@ struct Variable {
   std::string changed;  ///< why its value is decided at run time
 };
 
-[[nodiscard]] std::string upper(std::string text);
 [[nodiscard]] std::string stem_of(const std::string& name);
 /// `XP[3].X` -> `XP[3]`
 [[nodiscard]] std::string root_of(const std::string& name);

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "clients/cam/rapid/interpreter.h"
+#include "server/base/letters.h"
 #include "server/base/plain_text.h"
 
 // What changes at run time.
@@ -149,7 +150,7 @@ void Interpreter::note_changes_by_name(std::size_t module, const Instruction& in
   const std::string why = fmt::format("{} may set it ({})", instruction.spelled, place_of(module, instruction.line));
   const std::string text = positional[0]->kind == Kind::kText ? text_of(*positional[0], scope) : "";
   if (instruction.name == "setdataval" && text.size() > 2) {
-    const auto found = find(in_lower_case(text.substr(1, text.size() - 2)), scope);
+    const auto found = find(lower(text.substr(1, text.size() - 2)), scope);
     if (found && found->declaration->storage != Storage::kConst) changed_.emplace(found->declaration, why);
     return;
   }

@@ -9,6 +9,7 @@
 
 #include "clients/cam/rapid/syntax.h"
 #include "clients/cam/rapid/tokens.h"
+#include "server/base/letters.h"
 
 namespace trammel::cam::rapid {
 
@@ -31,7 +32,7 @@ class Expressions {
     return t.kind == TokenKind::kSign && t.end - t.begin == sign.size() && text_[t.begin] == sign[0];
   }
   [[nodiscard]] std::string word(std::size_t ahead = 0) const {
-    return token(ahead).kind == TokenKind::kWord ? in_lower_case(bytes(ahead)) : std::string();
+    return token(ahead).kind == TokenKind::kWord ? lower(bytes(ahead)) : std::string();
   }
   bool take(std::string_view sign) {
     if (!is_sign(sign)) return false;

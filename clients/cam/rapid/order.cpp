@@ -8,6 +8,7 @@
 
 #include "clients/cam/rapid/motions.h"
 #include "clients/cam/rapid/tokens.h"
+#include "server/base/letters.h"
 
 namespace trammel::cam::rapid {
 
@@ -97,7 +98,7 @@ class Order {
     const Expression& name = instruction.arguments[0];
     if (instruction.name != kLateCall || name.kind != Kind::kText) return "";
     const std::string& text = files_[module].text;
-    return in_lower_case(text.substr(name.begin + 1, name.end - std::min(name.end, name.begin + 2)));
+    return lower(text.substr(name.begin + 1, name.end - std::min(name.end, name.begin + 2)));
   }
 
   Step step_of(std::size_t module, const Instruction& instruction) const {

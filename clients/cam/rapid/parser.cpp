@@ -6,6 +6,7 @@
 #include <set>
 
 #include "clients/cam/rapid/expressions.h"
+#include "server/base/letters.h"
 #include "server/base/plain_text.h"
 
 namespace trammel::cam::rapid {
@@ -13,11 +14,6 @@ namespace trammel::cam::rapid {
 namespace {
 
 using Kind = Expression::Kind;
-
-std::string in_upper_case(std::string text) {
-  for (char& c : text) c = static_cast<char>(c >= 'a' && c <= 'z' ? c - 'a' + 'A' : c);
-  return text;
-}
 
 class Parser : private Expressions {
  public:
@@ -41,15 +37,15 @@ class Parser : private Expressions {
     int line = 0;
   };
   void open_block(const std::string& word, const std::string& name = {}) {
-    blocks_.push_back({word, name.empty() ? in_upper_case(word) : in_upper_case(word) + " " + name, token().line});
+    blocks_.push_back({word, name.empty() ? upper(word) : upper(word) + " " + name, token().line});
   }
   /// The block that the word at hand ends.
   void close_block(const std::string& word) {
     std::size_t open = blocks_.size();
     while (open > 0 && "end" + blocks_[open - 1].word != word) --open;
     if (open == 0) {
-      const std::string due = in_upper_case(word.substr(std::string_view("end").size()));
-      module_.unbalanced.push_back({fmt::format("{} has no {}", in_upper_case(word), due), token().line});
+      const std::string due = upper(word.substr(std::string_view("end").size()));
+      module_.unbalanced.push_back({fmt::format("{} has no {}", upper(word), due), token().line});
       return;
     }
     drop_blocks_down_to(open);
@@ -60,7 +56,7 @@ class Parser : private Expressions {
     for (; blocks_.size() > keep; blocks_.pop_back()) {
       const Block& block = blocks_.back();
       module_.unbalanced.push_back(
-          {fmt::format("{} has no END{}", shown(block.called), in_upper_case(block.word)), block.line});
+          {fmt::format("{} has no END{}", shown(block.called), upper(block.word)), block.line});
     }
   }
 
@@ -311,7 +307,7 @@ class Parser : private Expressions {
   }
   [[nodiscard]] std::string word_at(std::size_t index) const {
     const Token& t = tokens_[index];
-    return t.kind == TokenKind::kWord ? in_lower_case(text_.substr(t.begin, t.end - t.begin)) : std::string();
+    return t.kind == TokenKind::kWord ? lower(text_.substr(t.begin, t.end - t.begin)) : std::string();
   }
 
   /// `FOR i FROM a TO b DO`: i is a number that the loop decides.

@@ -7,6 +7,7 @@
 
 #include "clients/cam/rapid/motions.h"
 #include "clients/cam/rapid/tokens.h"
+#include "server/base/letters.h"
 #include "server/base/plain_text.h"
 
 namespace trammel::cam::rapid {
@@ -172,7 +173,7 @@ void Readings::note_readings(std::size_t m, const Span& span, int routine, int l
 void Readings::note_reading(const Scope& at, const std::string& spelled, int dots, int line, const std::string& by) {
   Expression name;
   name.kind = Kind::kName;
-  name.name = in_lower_case(spelled);
+  name.name = lower(spelled);
   const auto found = meaning_.find(name.name, at);
   if (!found || found->declaration->type == "num") return;
   const bool is_parameter = found->declaration->storage == Storage::kParameter;

@@ -2,11 +2,12 @@
 
 #include <algorithm>
 
+#include "server/base/letters.h"
+
 namespace trammel::cam::rapid {
 
 namespace {
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_letter(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_' || static_cast<unsigned char>(c) >= 0x80;
 }
@@ -86,13 +87,6 @@ std::vector<Token> tokens_of(std::string_view text) {
     tokens.push_back(scanner.next());
   } while (tokens.back().kind != TokenKind::kEnd);
   return tokens;
-}
-
-std::string in_lower_case(std::string_view text) {
-  std::string lower(text);
-  std::transform(lower.begin(), lower.end(), lower.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-  return lower;
 }
 
 }  // namespace trammel::cam::rapid

@@ -21,6 +21,4 @@ struct Token {
 /// tokens too.
 [[nodiscard]] std::vector<Token> tokens_of(std::string_view text);
 
-[[nodiscard]] std::string in_lower_case(std::string_view text);
-
 }  // namespace trammel::cam::rapid

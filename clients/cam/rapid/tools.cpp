@@ -7,6 +7,7 @@
 
 #include "clients/cam/cell_tools.h"
 #include "clients/cam/rapid/tokens.h"
+#include "server/base/letters.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
 
@@ -73,7 +74,7 @@ std::size_t Tools::undecided_load(std::size_t load, const std::string& why) {
 std::size_t Tools::known_tool(ProgramTool tool) {
   for (std::size_t k = 0; k < program_.tools.size(); ++k) {
     const ProgramTool& known = program_.tools[k];
-    if (in_lower_case(known.name) == in_lower_case(tool.name) && known.file == tool.file && known.line == tool.line &&
+    if (lower(known.name) == lower(tool.name) && known.file == tool.file && known.line == tool.line &&
         known.carries == tool.carries && known.X_FT.has_value() == tool.X_FT.has_value() &&
         (!tool.X_FT || known.X_FT->isApprox(*tool.X_FT, 1e-12)))
       return k;

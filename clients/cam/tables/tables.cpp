@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "server/base/letters.h"
+
 namespace trammel::cam {
 
 namespace {
@@ -65,11 +67,9 @@ std::vector<Row> rows_of(const std::string& text) {
   return rows;
 }
 
-std::string lower(std::string_view text) {
-  std::string made(text.substr(0, text.find_first_of("[( ")));
-  for (char& c : made) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
+/// The name of a column without its unit, in lower case.
+std::string column_name(std::string_view text) {
+  std::string made = lower(text.substr(0, text.find_first_of("[( ")));
   for (const char* unit : {"_mm", "_deg"}) {
     if (made.ends_with(unit)) made.erase(made.size() - std::string_view(unit).size());
   }
@@ -82,7 +82,7 @@ std::optional<Columns> named_columns(const Row& header) {
     std::vector<std::size_t> at;
     for (const char* name : names) {
       for (std::size_t k = 0; k < header.fields.size(); ++k) {
-        if (lower(header.fields[k].text) == name) {
+        if (column_name(header.fields[k].text) == name) {
           at.push_back(k);
           break;
         }

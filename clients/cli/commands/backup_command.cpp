@@ -7,6 +7,7 @@
 #include "clients/cli/files/program_files.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
+#include "server/base/letters.h"
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
@@ -23,12 +24,6 @@ using nlohmann::ordered_json;
 struct BackupArguments {
   std::string backup, robot, cell, unit, task, compare, output, frames, json;
 };
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
-  return text;
-}
 
 /// The entry of a folder with this name, whatever its case: backups are copied by all kinds of systems.
 std::string inside(const std::string& folder, const std::string& name) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "server/base/letters.h"
 #include "server/base/near_miss.h"
 #include "server/base/plain_text.h"
 #include "server/measurement/files/text_lines.h"
@@ -22,11 +23,6 @@ std::vector<std::string> optional_columns(TableKind kind) {
   if (kind == TableKind::kJoints) return names;
   names.insert(names.end(), {"sigma_mm", "session_id", "distance_mm", "touch_mm", "anchor_id", "minus_pose_id"});
   return names;
-}
-
-std::string lower(std::string text) {
-  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return text;
 }
 
 /// Whether one letter was inserted, left out or changed, or two neighbours are swapped.

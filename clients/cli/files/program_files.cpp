@@ -15,6 +15,7 @@
 #include "clients/cam/backup/backup.h"
 #include "clients/cam/mark.h"
 #include "clients/cam/stated_robot.h"
+#include "server/base/letters.h"
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
@@ -42,14 +43,7 @@ std::optional<cam::Dialect> dialect_of_found(const std::string& path) {
   std::string head(kHead, ' ');
   std::ifstream file(path, std::ios::binary);
   head.resize(static_cast<std::size_t>(file.read(head.data(), kHead).gcount()));
-  for (char& c : head) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-  return head.find("DEFDAT") == std::string::npos ? std::nullopt : dialect;
-}
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
+  return upper(head).find("DEFDAT") == std::string::npos ? std::nullopt : dialect;
 }
 
 /// The programs of a folder, by name.

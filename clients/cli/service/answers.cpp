@@ -8,6 +8,7 @@
 #include <set>
 #include <tuple>
 
+#include "server/base/letters.h"
 #include "server/base/units.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/measurement/pose_columns.h"
@@ -225,24 +226,19 @@ std::vector<std::string> correction_columns(const Corrections& corrections) {
   return columns;
 }
 
-std::string in_lower_case(std::string name) {
-  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
-  return name;
-}
-
 /// The names of the file's columns where `ours` stand behind them: none is named twice, whatever the case.
 std::vector<std::string> kept_columns(const std::vector<std::string>& columns, const std::vector<std::string>& ours) {
   std::set<std::string> taken;
-  for (const std::string& name : ours) taken.insert(in_lower_case(name));
+  for (const std::string& name : ours) taken.insert(lower(name));
   std::vector<std::string> kept = columns;
   std::vector<std::size_t> clashing;
   for (std::size_t k = 0; k < kept.size(); ++k) {
-    if (taken.contains(in_lower_case(kept[k]))) clashing.push_back(k);
+    if (taken.contains(lower(kept[k]))) clashing.push_back(k);
   }
-  for (const std::string& name : kept) taken.insert(in_lower_case(name));
+  for (const std::string& name : kept) taken.insert(lower(name));
   for (const std::size_t k : clashing) {
-    while (taken.contains(in_lower_case(kept[k]))) kept[k] = "input_" + kept[k];
-    taken.insert(in_lower_case(kept[k]));
+    while (taken.contains(lower(kept[k]))) kept[k] = "input_" + kept[k];
+    taken.insert(lower(kept[k]));
   }
   return kept;
 }

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <string_view>
 
+#include "server/base/letters.h"
 #include "server/base/near_miss.h"
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
@@ -23,11 +24,6 @@ struct Default {
 };
 
 constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
-
-std::string trimmed(const std::string& text) {
-  const auto first = text.find_first_not_of(" \t\r");
-  return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
-}
 
 Result<std::vector<Default>> read_defaults(const std::string& path) {
   const Result<std::string> text = read_text_file(path, 100'000);

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "clients/cli/text/help_topics.h"
+#include "server/base/letters.h"
 
 namespace trammel::cli {
 
@@ -51,10 +52,8 @@ std::string options_text(const CommandText& command) {
 
 std::string head(const std::string& name, const std::string& version, const std::string& description,
                  const std::string& usage) {
-  std::string upper = name;
-  std::transform(upper.begin(), upper.end(), upper.begin(), [](unsigned char c) { return std::toupper(c); });
   return fmt::format(".TH {} 1 \"\" \"trammel {}\" \"Trammel\"\n.SH NAME\n{} \\- {}\n.SH SYNOPSIS\n.B {}\n",
-                     troff(upper), version, troff(name), troff(description), troff(usage));
+                     troff(upper(name)), version, troff(name), troff(description), troff(usage));
 }
 
 constexpr const char* kEnd =
@@ -76,9 +75,7 @@ std::string page_of_program(const CommandText& program, const std::string& versi
   for (const CommandText& command : program.commands)
     page += fmt::format(".TP\n.BR trammel\\-{} (1)\n{}\n", troff(command.name), troff(command.description));
   for (const HelpTopic& topic : help_topics()) {
-    std::string title = topic.name;
-    std::transform(title.begin(), title.end(), title.begin(), [](unsigned char c) { return std::toupper(c); });
-    page += fmt::format(".SH {}\n{}", troff(title), paragraphs(topic.text));
+    page += fmt::format(".SH {}\n{}", troff(upper(topic.name)), paragraphs(topic.text));
   }
   return page + kEnd;
 }

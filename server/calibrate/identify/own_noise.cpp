@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/median.h"
+
 namespace trammel {
 
 namespace {
@@ -14,12 +16,6 @@ constexpr std::size_t kFewestPoses = 8;       // that tell how noisy a session i
 constexpr double kSettled = 0.02;             // relative
 
 /// Of two in the middle the lower one.
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Squared residuals of one kind in units of their variance, and that variance itself, session by session.
 struct Squares {
   std::vector<std::vector<double>> ratio;

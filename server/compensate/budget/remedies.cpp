@@ -7,6 +7,7 @@
 #include <cctype>
 #include <cmath>
 
+#include "server/base/letters.h"
 #include "server/base/shown_value.h"
 #include "server/base/units.h"
 
@@ -43,11 +44,6 @@ const std::vector<Maker>& makers() {
         "load of the tool"}},
   };
   return all;
-}
-
-std::string lower(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
 }
 
 std::string signed_value(double value, double u95, const std::string& unit) {

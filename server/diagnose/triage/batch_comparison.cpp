@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 
+#include "server/base/median.h"
 #include "server/diagnose/thresholds.h"
 #include "server/robot/rigid_fit.h"
 
@@ -17,12 +18,6 @@ constexpr double kDone = 1e-4;        // last step, in units of the parameters' 
 constexpr double kFarthest = 9;       // times the median of |residual|^2: annealing towards the final limit
 constexpr double kGoodMisfit = 2.25;  // chi^2 per degree of freedom: 1.5 times the expected deviation is still good
 constexpr double kWeakPrior = 1e-8;   // of what an alternative sets free, per squared scale of the parameter
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Directions of the free parameters that the poses show: more of them than the prior does.
 int shown_directions(const Alternative& alternative, const Eigen::MatrixXd& information) {

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 
+#include "server/base/median.h"
 #include "server/robot/rigid_fit.h"
 
 namespace trammel::health {
@@ -22,12 +23,6 @@ constexpr double kThin = 0.02;     // of how far the poses are away: within less
 constexpr double kJitter = 1e-6;   // of the instrument's variance: what is certain is so to rounding
 constexpr double kUnmoved = 0.02;  // of how far the poses are away: a zero of a degree moves them no farther
 constexpr double kTurned = 0.002;  // rad: of a base that is turned as the model has it
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Where the base stands by the positions, those left out that are much farther off than others.
 Result<Pose> located(const MeasurementBatch& batch, const std::vector<ErrorPrediction>& predictions) {

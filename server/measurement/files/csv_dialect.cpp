@@ -5,6 +5,7 @@
 #include <cctype>
 #include <vector>
 
+#include "server/base/letters.h"
 #include "server/base/plain_text.h"
 
 namespace trammel {
@@ -15,10 +16,6 @@ using namespace std::string_view_literals;
 
 constexpr std::array kSeparators = {',', ';', '\t'};
 constexpr const char* kExport = "export it as text: Save As, \"CSV UTF-8\", in Excel; \"Text CSV\" in LibreOffice";
-
-char lower(char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); }
-
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 std::string_view without_mark(std::string_view text) {
   return text.starts_with("\xEF\xBB\xBF") ? text.substr(3) : text;

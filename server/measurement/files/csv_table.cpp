@@ -7,6 +7,7 @@
 #include <limits>
 #include <set>
 
+#include "server/base/letters.h"
 #include "server/base/name_check.h"
 #include "server/base/near_miss.h"
 #include "server/base/plain_text.h"
@@ -18,23 +19,11 @@ namespace {
 
 constexpr double kQuaternionLimit = 1e-3;
 
-std::string_view trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t\r");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
-}
-
 constexpr std::size_t kMostValueBytes = 65'536;  // of one value
 constexpr const char* kSaveAsUtf8 = "save it as UTF-8: \"CSV UTF-8\" in Excel";
 constexpr const char* kTwoCommas =
     "write decimal points, or separate values by ';' or tabs: a comma that does both may be read in two ways";
 constexpr const char* kThousands = "leave out what separates thousands: 1234.5 instead of 1,234.5 or 1.234,5";
-
-std::string lower_case(std::string_view text) {
-  std::string lower(text);
-  for (char& c : lower) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return lower;
-}
 
 /// Whether the values of a row may stand in a table.
 Status check_values(const CsvTable::Row& row, const std::string& where) {
@@ -295,7 +284,7 @@ Status CsvTable::settle_decimals() {
 std::optional<std::size_t> CsvTable::find(std::string_view column) const {
   const auto at = std::find(columns_.begin(), columns_.end(), column);
   if (at != columns_.end()) return static_cast<std::size_t>(at - columns_.begin());
-  const auto alike = [wanted = lower_case(column)](const std::string& name) { return lower_case(name) == wanted; };
+  const auto alike = [wanted = lower(column)](const std::string& name) { return lower(name) == wanted; };
   const auto other = std::find_if(columns_.begin(), columns_.end(), alike);
   if (other == columns_.end() || std::find_if(other + 1, columns_.end(), alike) != columns_.end()) return std::nullopt;
   return static_cast<std::size_t>(other - columns_.begin());
@@ -306,10 +295,9 @@ namespace {
 /// A column that was meant, by its spelling or by what stands before its unit; empty where none looks like it.
 std::string meant_by(const std::string& column, const std::vector<std::string>& columns) {
   std::vector<std::string> names;
-  for (const std::string& name : columns) names.push_back(lower_case(name));
+  for (const std::string& name : columns) names.push_back(lower(name));
   const auto spelled = [&](const std::string& name) -> const std::string& {
-    return *std::find_if(columns.begin(), columns.end(),
-                         [&](const std::string& one) { return lower_case(one) == name; });
+    return *std::find_if(columns.begin(), columns.end(), [&](const std::string& one) { return lower(one) == name; });
   };
   const auto stem = [](const std::string& name) { return name.substr(0, name.find_first_of("_ ([")); };
   for (const std::string& name : names) {

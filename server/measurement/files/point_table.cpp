@@ -6,6 +6,7 @@
 #include <regex>
 #include <vector>
 
+#include "server/base/letters.h"
 #include "server/measurement/files/csv_dialect.h"
 #include "server/measurement/files/text_lines.h"
 
@@ -50,7 +51,7 @@ std::string words_of(std::string_view text) {
   for (const char c : text) {
     const bool blank = std::isspace(static_cast<unsigned char>(c)) != 0;
     if (blank && (words.empty() || words.back() == ' ')) continue;
-    words += blank ? ' ' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    words += blank ? ' ' : lower(c);
   }
   return words;
 }

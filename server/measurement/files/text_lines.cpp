@@ -5,6 +5,7 @@
 #include <charconv>
 #include <optional>
 
+#include "server/base/letters.h"
 #include "server/measurement/files/csv_dialect.h"
 
 namespace trammel {
@@ -14,14 +15,6 @@ namespace {
 constexpr std::string_view kBlanks = " \t\r";
 constexpr std::size_t kMostLines = 1'000'000;
 constexpr std::size_t kMostDataLines = 100'000;
-
-std::string_view trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(kBlanks);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
-}
-
-char lower(char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); }
 
 /// Where the field at the start of `line` ends.
 std::size_t field_end(std::string_view line, char separator) {

@@ -4,6 +4,8 @@
 #include <map>
 #include <string>
 
+#include "server/base/median.h"
+
 namespace trammel::reading {
 
 NumberTable table_of(const MeasurementBatch& batch) {
@@ -50,12 +52,6 @@ NumberTable thinned(const NumberTable& table, std::size_t most) {
   }
   std::sort(rows.begin(), rows.end());
   return matched(table, rows, rows);
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 }  // namespace trammel::reading
