@@ -97,7 +97,7 @@ rtps::Locator_t locator(const std::string& address, std::uint16_t port) {
 
 Result<std::shared_ptr<eprosima::fastdds::rtps::UDPv4TransportDescriptor>> udp_on(const std::string& address) {
   set_up_process();
-  if (const Status usable = check_address(address); !usable) return tl::make_unexpected(usable.error());
+  TRY(check_address(address));
   auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
   udp->interfaceWhiteList = {address};
   udp->sendBufferSize = kSocketBuffer;

@@ -99,11 +99,10 @@ rtps::RemoteServerList_t remote(const std::vector<HostPort>& places) {
 Result<ParticipantPtr> client_of(const std::vector<HostPort>& discovery_servers, const std::string& address,
                                  rtps::DiscoveryProtocol_t protocol, const std::string& user_data,
                                  dds::DomainParticipantListener* listener) {
-  const auto udp = udp_on(address);
-  if (!udp) return tl::make_unexpected(udp.error());
+  const auto udp = TRY(udp_on(address));
   const auto servers = remote(discovery_servers);
   dds::DomainParticipantQos qos =
-      participant_qos(with_relay_guard(*udp, relays_of(servers, discovery_servers)), address, 0);
+      participant_qos(with_relay_guard(udp, relays_of(servers, discovery_servers)), address, 0);
   qos.name("trammel place");
   set_user_data(qos, user_data);
   auto& discovery = qos.wire_protocol().builtin.discovery_config;
@@ -160,22 +159,19 @@ Result<ParticipantPtr> announce_place(const Place& place, const std::vector<Host
   if (!beacon) return beacon;
   // A discovery server passes on nobody who has no endpoint. Nothing is ever written.
   const auto topic =
-      make_topic(**beacon, kTopic, new SafeType<ServiceStatusTopic::Type>(ServiceStatusTopic::kMaxSample));
-  if (!topic) return tl::make_unexpected(topic.error());
+      TRY(make_topic(**beacon, kTopic, new SafeType<ServiceStatusTopic::Type>(ServiceStatusTopic::kMaxSample)));
   dds::Publisher* const publisher = (*beacon)->create_publisher(publisher_qos({}));
-  if (publisher == nullptr || publisher->create_datawriter(*topic, state_writer_qos()) == nullptr)
+  if (publisher == nullptr || publisher->create_datawriter(topic, state_writer_qos()) == nullptr)
     return failure(ErrorCode::kInternal, "cannot create the writer that discovery servers pass on");
   return beacon;
 }
 
 Result<std::vector<HostPort>> look_for_places(const std::vector<HostPort>& discovery_servers, std::uint32_t domain,
                                               std::chrono::milliseconds limit) {
-  const auto address = own_address_towards(discovery_servers.front().address);
-  if (!address) return tl::make_unexpected(address.error());
-  FoundPlaces found(domain, !address->starts_with("127."));
+  const auto address = TRY(own_address_towards(discovery_servers.front().address));
+  FoundPlaces found(domain, !address.starts_with("127."));
   Looker looker(found);
-  const auto participant = client_of(discovery_servers, *address, rtps::DiscoveryProtocol_t::SUPER_CLIENT, {}, &looker);
-  if (!participant) return tl::make_unexpected(participant.error());
+  TRY(client_of(discovery_servers, address, rtps::DiscoveryProtocol_t::SUPER_CLIENT, {}, &looker));
   std::vector<HostPort> places = found.wait(limit);
   if (!places.empty()) return places;
   std::vector<std::string> asked;

@@ -59,9 +59,8 @@ class Folder {
     return refused("{}", why).in(path(name));
   }
   [[nodiscard]] Result<Certificate> certificate(const char* name) const {
-    const auto pem = text(name);
-    if (!pem) return tl::make_unexpected(pem.error());
-    Certificate certificate(PEM_read_bio_X509(bio_of(*pem).get(), nullptr, nullptr, nullptr));
+    const auto pem = TRY(text(name));
+    Certificate certificate(PEM_read_bio_X509(bio_ofpem.get(), nullptr, nullptr, nullptr));
     if (!certificate) return wrong(name, "no certificate in PEM form");
     return certificate;
   }
@@ -81,9 +80,8 @@ std::string subject_of(const X509& certificate) { return text_of(*X509_get_subje
 /// The authority of identities with the revocation lists behind it.
 Result<Authorities> identity_authority(const Folder& folder) {
   constexpr const char* kName = "identity_ca.cert.pem";
-  const auto pem = folder.text(kName);
-  if (!pem) return tl::make_unexpected(pem.error());
-  const Bio bio = bio_of(*pem);
+  const auto pem = TRY(folder.text(kName));
+  const Bio bio = bio_of(pem);
   const Certificate certificate(PEM_read_bio_X509(bio.get(), nullptr, nullptr, nullptr));
   if (!certificate) return folder.wrong(kName, "no certificate in PEM form");
   Authorities authorities(X509_STORE_new());
@@ -96,10 +94,9 @@ Result<Authorities> identity_authority(const Folder& folder) {
 }
 
 Status check_certificate(const Folder& folder, X509& certificate) {
-  const auto authorities = identity_authority(folder);
-  if (!authorities) return tl::make_unexpected(authorities.error());
+  const auto authorities = TRY(identity_authority(folder));
   const Verification verification(X509_STORE_CTX_new());
-  X509_STORE_CTX_init(verification.get(), authorities->get(), &certificate, nullptr);
+  X509_STORE_CTX_init(verification.get(), authorities.get(), &certificate, nullptr);
   if (X509_verify_cert(verification.get()) == 1) return {};
   return folder.wrong("cert.pem", X509_verify_cert_error_string(X509_STORE_CTX_get_error(verification.get())))
       .next("ask whoever issues certificates for a new one; see deploy/security/README.md");
@@ -111,9 +108,8 @@ Status check_key(const Folder& folder, const X509& certificate) {
     return folder.wrong("key.pem", "others than its owner and group may read or change it")
         .next("chmod 640 " + folder.path("key.pem"));
   }
-  const auto pem = folder.text("key.pem");
-  if (!pem) return tl::make_unexpected(pem.error());
-  const Key key(PEM_read_bio_PrivateKey(bio_of(*pem).get(), nullptr, nullptr, nullptr));
+  const auto pem = TRY(folder.text("key.pem"));
+  const Key key(PEM_read_bio_PrivateKey(bio_ofpem.get(), nullptr, nullptr, nullptr));
   if (!key) return folder.wrong("key.pem", "no private key in PEM form, or one with a password");
   if (X509_check_private_key(&certificate, key.get()) != 1) return folder.wrong("key.pem", "not the key of cert.pem");
   return {};
@@ -121,10 +117,9 @@ Status check_key(const Folder& folder, const X509& certificate) {
 
 /// What was signed by the authority of the permissions.
 Result<std::string> signed_text(const Folder& folder, const char* name, X509& authority) {
-  const auto smime = folder.text(name);
-  if (!smime) return tl::make_unexpected(smime.error());
+  const auto smime = TRY(folder.text(name));
   BIO* content = nullptr;
-  const Signed parsed(SMIME_read_PKCS7(bio_of(*smime).get(), &content));
+  const Signed parsed(SMIME_read_PKCS7(bio_ofsmime.get(), &content));
   const Bio given(content);
   if (!parsed || !given) return folder.wrong(name, "no signed rules in S/MIME form");
   Authorities authorities(X509_STORE_new());
@@ -251,20 +246,15 @@ std::string confirmed_subject(const std::string& claimed, const std::string& par
 
 Result<Security> read_security(const std::string& path) {
   const Folder folder(path);
-  const auto certificate = folder.certificate("cert.pem");
-  if (!certificate) return tl::make_unexpected(certificate.error());
-  if (const Status fine = check_certificate(folder, **certificate); !fine) return tl::make_unexpected(fine.error());
-  if (const Status fine = check_key(folder, **certificate); !fine) return tl::make_unexpected(fine.error());
-  const auto authority = folder.certificate("permissions_ca.cert.pem");
-  if (!authority) return tl::make_unexpected(authority.error());
-  const auto governance = signed_text(folder, "governance.p7s", **authority);
-  if (!governance) return tl::make_unexpected(governance.error());
-  const auto permissions = signed_text(folder, "permissions.p7s", **authority);
-  if (!permissions) return tl::make_unexpected(permissions.error());
-  const std::string subject = subject_of(**certificate);
-  if (const Status fine = check_permissions(folder, subject, *permissions); !fine)
-    return tl::make_unexpected(fine.error());
-  return Security{path, subject, role_in(*permissions)};
+  const auto certificate = TRY(folder.certificate("cert.pem"));
+  TRY(check_certificate(folder, *certificate));
+  TRY(check_key(folder, *certificate));
+  const auto authority = TRY(folder.certificate("permissions_ca.cert.pem"));
+  TRY(signed_text(folder, "governance.p7s", *authority));
+  const auto permissions = TRY(signed_text(folder, "permissions.p7s", *authority));
+  const std::string subject = subject_of(*certificate);
+  TRY(check_permissions(folder, subject, permissions));
+  return Security{path, subject, role_in(permissions)};
 }
 
 Status check_serves(const Security& security) {

@@ -81,8 +81,7 @@ void set_reader_times(dds::DataReaderQos& qos) {
 }  // namespace
 
 Result<ParticipantPtr> make_participant(const ParticipantOptions& options, dds::DomainParticipantListener* discovery) {
-  const auto udp = udp_on(options.address);
-  if (!udp) return tl::make_unexpected(udp.error());
+  const auto udp = TRY(udp_on(options.address));
   GateOptions gate{options.domain, options.heard_of_itself, options.dropped};
   gate.secured = options.security.has_value();
   gate.serves = options.heard_of_itself != nullptr;
@@ -93,7 +92,7 @@ Result<ParticipantPtr> make_participant(const ParticipantOptions& options, dds::
   if (!options.address.starts_with("127."))
     gate.largest_sent = options.security ? kSecuredDatagramOfALine : kDatagramOfALine;
 
-  dds::DomainParticipantQos qos = participant_qos(with_domain_gate(*udp, gate), options.address, options.listen_port);
+  dds::DomainParticipantQos qos = participant_qos(with_domain_gate(udp, gate), options.address, options.listen_port);
   qos.name(options.name);
   set_user_data(qos, domain_mark(options.domain));
   for (const auto& host : gate.hosts) qos.wire_protocol().builtin.initialPeersList.push_back(host);

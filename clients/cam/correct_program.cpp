@@ -77,7 +77,7 @@ class Correcting {
   Result<CorrectedProgram> correct(const AskCorrections& ask) {
     edits_.resize(program_.files.size());
     for (std::size_t t = 0; t < program_.targets.size(); ++t) begin_row(t);
-    if (const Status answered = ask_all(ask); !answered) return tl::make_unexpected(answered.error());
+    TRY(ask_all(ask));
     return finish();
   }
 
@@ -104,14 +104,13 @@ class Correcting {
     for (const TargetGroup& group : groups_of(program_, nominal_)) {
       std::vector<client::TargetMm> targets;
       for (const std::size_t t : group.targets) targets.push_back(std::move(nominal_.targets[t].asked));
-      const Result<client::Answer<client::CorrectedTarget>> answer = ask(group.tool, group.payload, targets);
-      if (!answer) return tl::make_unexpected(answer.error());
+      const client::Answer<client::CorrectedTarget> answer = TRY(ask(group.tool, group.payload, targets));
       targets = {};
-      if (!result_.model_id.empty() && result_.model.hash != answer->model.hash)
+      if (!result_.model_id.empty() && result_.model.hash != answer.model.hash)
         return failure(ErrorCode::kBusy, "the model changed while the program was corrected").next("try again");
-      result_.model = answer->model;
-      result_.model_id = answer->model.id;
-      for (std::size_t k = 0; k < group.targets.size(); ++k) take(group.targets[k], answer->items[k]);
+      result_.model = answer.model;
+      result_.model_id = answer.model.id;
+      for (std::size_t k = 0; k < group.targets.size(); ++k) take(group.targets[k], answer.items[k]);
     }
     return {};
   }
@@ -348,11 +347,10 @@ std::size_t CorrectedProgram::left_alone() const {
 
 Result<CorrectedProgram> correct_program(const Program& program, const Chain& robot, const CellTools& cell,
                                          const AskCorrections& ask, const CorrectProgramOptions& options) {
-  if (const Status fresh = check_marks(program); !fresh) return tl::make_unexpected(fresh.error());
+  TRY(check_marks(program));
   const ArmOfProgram arm(robot);
-  Result<NominalTargets> nominal = nominal_targets(program, arm, cell, options.tool, options.payload);
-  if (!nominal) return tl::make_unexpected(nominal.error());
-  return Correcting(program, arm, cell, options, std::move(*nominal)).correct(ask);
+  NominalTargets nominal = TRY(nominal_targets(program, arm, cell, options.tool, options.payload));
+  return Correcting(program, arm, cell, options, std::move(nominal)).correct(ask);
 }
 
 }  // namespace trammel::cam

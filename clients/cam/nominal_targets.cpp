@@ -333,18 +333,17 @@ std::vector<double> in_degrees(const ProgramTarget& target, std::vector<double> 
 
 Result<NominalTargets> nominal_targets(const Program& program, const ArmOfProgram& arm, const CellTools& cell,
                                        const std::string& tool, const std::string& payload, BareTools bare) {
-  if (const Status whole = check_files(program); !whole) return tl::make_unexpected(whole.error());
-  if (const Status same = check_stated_robot(program, arm.robot()); !same) return tl::make_unexpected(same.error());
-  if (const Status upright = check_gravity(program, cell); !upright) return tl::make_unexpected(upright.error());
+  TRY(check_files(program));
+  TRY(check_stated_robot(program, arm.robot()));
+  TRY(check_gravity(program, cell));
   std::vector<ToolUse> uses(program.tools.size(), ToolUse::kNone);
   for (const ProgramTarget& target : program.targets) {
     const bool joints = bare == BareTools::kOfTheCell && is_joints(target.coordinates);
     ToolUse& use = uses[target.tool];
     if (use != ToolUse::kPoses) use = joints ? ToolUse::kJoints : ToolUse::kPoses;
   }
-  Result<std::vector<ToolChoice>> choices = choose_tools(program, uses, cell, tool, payload);
-  if (!choices) return tl::make_unexpected(choices.error());
-  return Finding(program, arm, cell, std::move(*choices)).find();
+  std::vector<ToolChoice> choices = TRY(choose_tools(program, uses, cell, tool, payload));
+  return Finding(program, arm, cell, std::move(choices)).find();
 }
 
 std::optional<Pose> wanted_pose(const Program& program, const Chain& robot, const CellTools& cell,

@@ -55,20 +55,19 @@ Result<PredictedProgram> predict_program(const Program& program, const Chain& ro
                                          const AskPredictions& ask, const std::string& tool,
                                          const std::string& payload) {
   const ArmOfProgram arm(robot);
-  const Result<NominalTargets> nominal = nominal_targets(program, arm, cell, tool, payload, BareTools::kOfTheCell);
-  if (!nominal) return tl::make_unexpected(nominal.error());
+  const NominalTargets nominal = TRY(nominal_targets(program, arm, cell, tool, payload, BareTools::kOfTheCell));
   PredictedProgram result;
-  result.notes = nominal->notes;
+  result.notes = nominal.notes;
   for (std::size_t t = 0; t < program.targets.size(); ++t) {
     result.targets.push_back(begun(program, t));
-    result.targets[t].message = nominal->targets[t].why_not;
-    if (const auto X_BT = wanted_pose(program, robot, cell, *nominal, t)) result.targets[t].p_B = X_BT->translation();
+    result.targets[t].message = nominal.targets[t].why_not;
+    if (const auto X_BT = wanted_pose(program, robot, cell, nominal, t)) result.targets[t].p_B = X_BT->translation();
   }
-  for (const TargetGroup& group : groups_of(program, *nominal)) {
+  for (const TargetGroup& group : groups_of(program, nominal)) {
     std::vector<std::size_t> found;
     std::vector<client::CommandedJoints> poses;
     for (const std::size_t t : group.targets) {
-      const auto& q = nominal->targets[t].q;
+      const auto& q = nominal.targets[t].q;
       if (!q) {
         result.targets[t].status = "unreachable";
         result.targets[t].message = "no joints bring the tool there";
@@ -78,14 +77,13 @@ Result<PredictedProgram> predict_program(const Program& program, const Chain& ro
       poses.push_back({joints_on_wire(*q, robot), {}});
     }
     if (poses.empty()) continue;
-    const auto answer = ask(group.tool, group.payload, poses);
-    if (!answer) return tl::make_unexpected(answer.error());
-    if (!result.model_id.empty() && result.model.hash != answer->model.hash)
+    const auto answer = TRY(ask(group.tool, group.payload, poses));
+    if (!result.model_id.empty() && result.model.hash != answer.model.hash)
       return failure(ErrorCode::kBusy, "the model changed while the program was predicted").next("try again");
-    result.model = answer->model;
-    result.model_id = answer->model.id;
+    result.model = answer.model;
+    result.model_id = answer.model.id;
     for (std::size_t k = 0; k < found.size(); ++k)
-      take(answer->items[k], robot, *nominal->targets[found[k]].q, result.targets[found[k]]);
+      take(answer.items[k], robot, *nominal.targets[found[k]].q, result.targets[found[k]]);
   }
   for (const LeftAlone& one : program.left) {
     if (!one.motion.empty()) result.targets.push_back(left(program, one));

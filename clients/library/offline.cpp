@@ -159,26 +159,22 @@ trammel::Result<trammel::Target> target_from(const Target& asked, const Context&
 
 /// The ids that a model is asked with.
 trammel::Result<Context> known_context(const CompensatedModel& model, Context context) {
-  if (const auto fits = library::check_context(context, model.cell().robot); !fits)
-    return tl::make_unexpected(fits.error());
-  auto tool = resolve_tool(model.cell(), context.tool);
-  if (!tool) return tl::make_unexpected(tool.error());
-  auto payload = resolve_payload(model.cell(), context.payload);
-  if (!payload) return tl::make_unexpected(payload.error());
-  if (const auto known = model.check_trained_with(*tool, *payload); !known) return tl::make_unexpected(known.error());
-  context.tool = std::move(*tool);
-  context.payload = std::move(*payload);
+  TRY(library::check_context(context, model.cell().robot));
+  auto tool = TRY(resolve_tool(model.cell(), context.tool));
+  auto payload = TRY(resolve_payload(model.cell(), context.payload));
+  TRY(model.check_trained_with(tool, payload));
+  context.tool = std::move(tool);
+  context.payload = std::move(payload);
   return context;
 }
 
 trammel::Result<std::vector<PoseContext>> contexts(std::span<const double> joints_deg, const Context& context,
                                                    const trammel::Cell& cell) {
-  auto all = library::all_joints_from_api(joints_deg, cell.robot);
-  if (!all) return tl::make_unexpected(all.error());
-  std::vector<PoseContext> poses(all->size());
+  auto all = TRY(library::all_joints_from_api(joints_deg, cell.robot));
+  std::vector<PoseContext> poses(all.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
     PoseContext& pose = poses[i];
-    pose.q = std::move((*all)[i]);
+    pose.q = std::move(all[i]);
     pose.direction = context.directions;
     pose.temperature = context.temperature_c;
     pose.tool = context.tool;

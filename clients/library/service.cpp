@@ -27,11 +27,10 @@ struct Session::Inside {
       const MutexLock lock(mutex);
       if (const auto known = robots.find(cell); known != robots.end()) return known->second;
     }
-    const auto model = session->export_model(cell, 0).and_then(
-        [&](const std::string& text) { return deserialize(text, "model of cell " + cell, ModelTexts::kAsTheyAre); });
-    if (!model) return tl::make_unexpected(model.error());
+    const auto model = TRY(session->export_model(cell, 0).and_then(
+        [&](const std::string& text) { return deserialize(text, "model of cell " + cell, ModelTexts::kAsTheyAre); }));
     const MutexLock lock(mutex);
-    return robots.try_emplace(cell, model->cell().robot).first->second;
+    return robots.try_emplace(cell, model.cell().robot).first->second;
   }
 };
 

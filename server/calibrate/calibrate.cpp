@@ -56,18 +56,16 @@ Status refine_frames(PhysicalModel& model, const MeasurementBatch& batch, const 
     free.emplace_back(cause_correcting(causes::Part::kBase).spelling);
   if (tool_unknown) free.emplace_back(cause_correcting(causes::Part::kTool).spelling);
   if (free.empty()) return {};
-  Result<PhysicalModel> frames = make_physical_model(model.cell, free);
-  if (!frames) return tl::make_unexpected(frames.error());
-  frames->X_WB = model.X_WB;
-  frames->tools = model.tools;
-  if (base_known) localise_base(*frames, batch);
-  const Result<CalibrationResult> refined = identify({*frames, positions_of(batch)}, options);
-  if (!refined) return tl::make_unexpected(refined.error());
+  PhysicalModel frames = TRY(make_physical_model(model.cell, free));
+  frames.X_WB = model.X_WB;
+  frames.tools = model.tools;
+  if (base_known) localise_base(frames, batch);
+  const CalibrationResult refined = TRY(identify({frames, positions_of(batch)}, options));
   for (auto& [tool, X_FT] : model.tools) {
     PoseContext anywhere;
     anywhere.q = JointVector::Zero(model.cell->robot.size());
     anywhere.tool = tool;
-    const ArmState arm = refined->model.state(anywhere);
+    const ArmState arm = refined.model.state(anywhere);
     X_FT = arm.X_FT;
     if (!base_known) model.X_WB = arm.X_WB;
   }
@@ -125,26 +123,23 @@ Status place_instruments(PhysicalModel& model, const MeasurementBatch& batch, co
   if (base < 0 || has_positions(batch) || untold_motions(model, batch) > 0) return {};
   auto anywhere = std::make_shared<Cell>(*model.cell);
   anywhere->X_WB.reset();
-  Result<PhysicalModel> frames = make_physical_model(anywhere, {"base", std::string(kAnchors)});
-  if (!frames) return tl::make_unexpected(frames.error());
-  frames->X_WB = model.X_WB;
-  frames->tools = model.tools;
-  if (const Status located = locate_anchors(*frames, batch); !located) return located;
+  PhysicalModel frames = TRY(make_physical_model(anywhere, {"base", std::string(kAnchors)}));
+  frames.X_WB = model.X_WB;
+  frames.tools = model.tools;
+  if (const Status located = locate_anchors(frames, batch); !located) return located;
   CalibrateOptions free = options;
   free.held.clear();
-  const Result<CalibrationResult> found = identify({*frames, batch}, free);
-  if (!found) return tl::make_unexpected(found.error());
-  model.values.segment<6>(base) = found->model.values.segment<6>(place_of_base(found->model));
+  const CalibrationResult found = TRY(identify({frames, batch}, free));
+  model.values.segment<6>(base) = found.model.values.segment<6>(place_of_base(found.model));
   return locate_anchors(model, batch);
 }
 
 /// Everything but the frames, which are where the model has them.
 Result<CalibrationResult> calibrate_placed(CalibrationProblem problem, const CalibrateOptions& options) {
-  if (Status fit = check_needs(problem); !fit) return tl::make_unexpected(fit.error());
+  TRY(check_needs(problem));
   localise_base(problem.model, problem.batch);
-  if (Status placed = place_instruments(problem.model, problem.batch, options); !placed)
-    return tl::make_unexpected(placed.error());
-  if (Status searched = search_orders(problem, options); !searched) return tl::make_unexpected(searched.error());
+  TRY(place_instruments(problem.model, problem.batch, options));
+  TRY(search_orders(problem, options));
   return identify_with_sessions(problem, options);
 }
 
@@ -160,15 +155,14 @@ Result<CalibrationResult> calibrate_from(CalibrationProblem placed, const Calibr
 /// Beside a tool that is known, positions at one place would fit a base that is turned anyhow: its turn shows only in
 /// what the real tool is off the drawn one. So both are found from all sides, and the base is taken.
 Status turn_by_free_tool(PhysicalModel& model, const MeasurementBatch& batch, const CalibrateOptions& options) {
-  Result<PhysicalModel> frames =
-      make_physical_model(model.cell, {std::string(cause_correcting(causes::Part::kBase).spelling),
-                                       std::string(cause_correcting(causes::Part::kTool).spelling)});
-  if (!frames) return tl::make_unexpected(frames.error());
+  PhysicalModel frames =
+      TRY(make_physical_model(model.cell, {std::string(cause_correcting(causes::Part::kBase).spelling),
+                                           std::string(cause_correcting(causes::Part::kTool).spelling)}));
   const std::vector<Pose> bases = likely_bases(model, batch);
   double best = -std::numeric_limits<double>::infinity();
   for (const Pose& X_WB : bases) {
-    frames->X_WB = X_WB;
-    const auto found = identify({*frames, positions_of(batch)}, options);
+    frames.X_WB = X_WB;
+    const auto found = identify({frames, positions_of(batch)}, options);
     if (!found || found->log_evidence <= best) continue;
     best = found->log_evidence;
     model.X_WB = found->model.state(batch.measurements.front().context).X_WB;
@@ -181,8 +175,7 @@ Result<CalibrationResult> calibrate_located(const CalibrationProblem& problem, c
   std::vector<Pose> bases = likely_bases(problem.model, problem.batch);
   if (bases.size() > 1 && !has_unknown_tool(*problem.model.cell)) {
     PhysicalModel turned = problem.model;
-    if (Status found = turn_by_free_tool(turned, problem.batch, options); !found)
-      return tl::make_unexpected(found.error());
+    TRY(turn_by_free_tool(turned, problem.batch, options));
     bases = {turned.X_WB};
   }
   std::optional<Result<CalibrationResult>> best;
@@ -216,9 +209,8 @@ Result<CalibrationResult> calibrate_there(const CalibrationProblem& problem, con
   CalibrationProblem complete = problem;
   std::vector<SessionSetting> sessions;
   if (has_sessions(problem.batch)) {
-    Result<std::vector<SessionSetting>> located = locate_sessions(problem.model, problem.batch);
-    if (!located) return tl::make_unexpected(located.error());
-    sessions = std::move(*located);
+    std::vector<SessionSetting> located = TRY(locate_sessions(problem.model, problem.batch));
+    sessions = std::move(located);
     complete.batch = moved_there(problem, sessions);
   }
   if (has_unknown_frame(*problem.model.cell)) {
@@ -300,7 +292,7 @@ bool is_of_the_robot(const PhysicalModel& model) {
 Result<CalibrationResult> calibrate(const CalibrationProblem& problem, const CalibrateOptions& options) {
   if (problem.batch.measurements.empty())
     return refused("no measurements to calibrate with").in("batch " + problem.batch.id).beyond(0, 1);
-  if (const Status told = check_gauges(problem.model, problem.batch); !told) return tl::make_unexpected(told.error());
+  TRY(check_gauges(problem.model, problem.batch));
   // Nobody says where the base stands: it is found by the session that tells most, not by the few poses of the newest.
   if (has_sessions(problem.batch) && !problem.model.cell->X_WB && is_of_the_robot(problem.model))
     return calibrate_by(largest_session(problem.batch), problem, options);
@@ -338,9 +330,8 @@ Result<CalibrationResult> most_likely(const std::shared_ptr<const Cell>& cell,
     for (std::string& spec : candidate) {
       if (const auto order = found.find(spec); order != found.end()) spec = order->second;
     }
-    Result<PhysicalModel> model = make_physical_model(cell, candidate);
-    if (!model) return tl::make_unexpected(model.error());
-    Result<CalibrationResult> result = calibrate({std::move(*model), batch}, options);
+    PhysicalModel model = TRY(make_physical_model(cell, candidate));
+    Result<CalibrationResult> result = calibrate({std::move(model), batch}, options);
     if (!result) return result;
     for (const auto& [name, spec] : found_orders(result->model)) found[name] = spec;
     if (!best || result->log_likelihood > best->log_likelihood) best = std::move(result);
@@ -427,12 +418,11 @@ Result<CalibrationResult> calibrate_zeroed(const CalibrationResult& without, con
 
 Result<CalibrationResult> calibrate(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& specs,
                                     const MeasurementBatch& batch, const CalibrateOptions& options) {
-  const Result<std::vector<std::string>> sources = with_instruments(specs, *cell, batch);
-  if (!sources) return tl::make_unexpected(sources.error());
-  Result<CalibrationResult> exact = calibrate_weighed(cell, *sources, batch, options);
-  const bool zeros_asked = std::find(sources->begin(), sources->end(), kInstrumentZero) != sources->end();
+  const std::vector<std::string> sources = TRY(with_instruments(specs, *cell, batch));
+  Result<CalibrationResult> exact = calibrate_weighed(cell, sources, batch, options);
+  const bool zeros_asked = std::find(sources.begin(), sources.end(), kInstrumentZero) != sources.end();
   if (!has_gauges(batch) || zeros_asked) return exact;
-  std::vector<std::string> with_zeros = *sources;
+  std::vector<std::string> with_zeros = sources;
   with_zeros.emplace_back(kInstrumentZero);
   // Values that are far too long fit nothing without a zero.
   Result<CalibrationResult> zeroed =

@@ -10,7 +10,7 @@ Result<CalibrationResult> calibrate_with_maps(const std::shared_ptr<const Cell>&
                                               const std::vector<std::string>& specs, const MeasurementBatch& batch,
                                               const CalibrateOptions& options) {
   // Specs that are wrong, or given twice, are refused as they are written.
-  if (const auto model = make_physical_model(cell, specs); !model) return tl::make_unexpected(model.error());
+  TRY(make_physical_model(cell, specs));
   std::vector<std::string> all = spelled_out(specs, *cell);
   std::vector<std::string> others;
   std::vector<int> joints;

@@ -58,14 +58,13 @@ Result<IdentifiedSessions> without_idle_changes(const Identify& identify, Identi
   for (std::size_t k = 0; k < found.changes.size() && found.changes.size() > 1;) {
     std::vector<std::string> fewer = names_of(found.calibration.model);
     for (const std::string& source : found.changes[k].sources()) std::erase(fewer, source);
-    auto without = identify(fewer);
-    if (!without) return tl::make_unexpected(without.error());
-    const std::optional<Proposal> missed = proposed_change(*without, batch);
-    if (missed && is_better(found.calibration, *without, *missed)) {
+    auto without = TRY(identify(fewer));
+    const std::optional<Proposal> missed = proposed_change(without, batch);
+    if (missed && is_better(found.calibration, without, *missed)) {
       ++k;
       continue;
     }
-    found.calibration = std::move(*without);
+    found.calibration = std::move(without);
     found.changes.erase(found.changes.begin() + static_cast<std::ptrdiff_t>(k));
     k = 0;
   }
@@ -77,13 +76,11 @@ Result<IdentifiedSessions> without_idle_changes(const Identify& identify, Identi
 Result<IdentifiedSessions> identify_sessions(const Identify& identify, const std::vector<std::string>& sources,
                                              const MeasurementBatch& batch,
                                              const std::function<Status(double share)>& go_on) {
-  auto calibration = identify(sources);
-  if (!calibration) return tl::make_unexpected(calibration.error());
-  IdentifiedSessions found{std::move(*calibration), {}};
+  auto calibration = TRY(identify(sources));
+  IdentifiedSessions found{std::move(calibration), {}};
   if (!has_sessions(batch)) return found;
   while (found.changes.size() < kMostChanges) {
-    const Status wanted = go_on(static_cast<double>(found.changes.size()) / kMostChanges);
-    if (!wanted) return tl::make_unexpected(wanted.error());
+    TRY(go_on(static_cast<double>(found.changes.size()) / kMostChanges));
     std::optional<Proposal> proposal = proposed_change(found.calibration, batch);
     if (!proposal) break;
     auto with = identify(with_change(found.calibration.model, proposal->change));

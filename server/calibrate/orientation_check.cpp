@@ -144,9 +144,8 @@ Result<BaseAndTool> located(const Positions& positions, const std::optional<Pose
   Eigen::Matrix3Xd p_B(3, positions.p_W.cols());
   for (std::size_t i = 0; i < positions.X_BF.size(); ++i)
     p_B.col(static_cast<Eigen::Index>(i)) = positions.X_BF[i] * X_FT->translation();
-  const Result<Pose> X_WB = fit_transform(positions.p_W, p_B);
-  if (!X_WB) return tl::make_unexpected(X_WB.error());
-  return BaseAndTool{*X_WB, *X_FT};
+  const Pose X_WB = TRY(fit_transform(positions.p_W, p_B));
+  return BaseAndTool{X_WB, *X_FT};
 }
 
 /// What the positions tell of the base; `belong`: whether they are of these joints.

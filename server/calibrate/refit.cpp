@@ -69,11 +69,10 @@ Result<std::string> named_source(PhysicalModel& model, const std::string& name, 
   for (const ErrorSourcePtr& source : model.sources) {
     if (contains(names, source->name())) return source->name();
   }
-  Result<ErrorSourcePtr> added = make_error_source(name, *model.cell);
-  if (!added) return tl::make_unexpected(added.error());
-  std::string full_name = (*added)->name();
-  const auto count = static_cast<Index>((*added)->parameters().size());
-  const Index first = add_source(model, std::move(*added));
+  ErrorSourcePtr added = TRY(make_error_source(name, *model.cell));
+  std::string full_name = added->name();
+  const auto count = static_cast<Index>(added->parameters().size());
+  const Index first = add_source(model, std::move(added));
   for (Index& one : place) one += one >= first ? count : 0;
   return full_name;
 }
@@ -170,18 +169,17 @@ MatrixXd Refit::carried(const MatrixXd& before) const {
 
 Result<PhysicalModel> in_cell(const PhysicalModel& model, const std::shared_ptr<const Cell>& cell,
                               std::vector<Index>* place) {
-  if (const Status all = check_has_all(model, *cell); !all) return tl::make_unexpected(all.error());
+  TRY(check_has_all(model, *cell));
   PhysicalModel moved = model;
   moved.cell = cell;
   for (const auto& [id, X_FT] : cell->tools) moved.tools.emplace(id, X_FT.value_or(Pose::Identity()));
   std::vector<Index> went;
   Index first = 0;
   for (ErrorSourcePtr& source : moved.sources) {
-    Result<ErrorSourcePtr> same = make_error_source(source->name(), *cell);
-    if (!same) return tl::make_unexpected(same.error());
-    for (const Index k : places(*source, *model.cell, **same, *cell)) went.push_back(first + k);
-    first += static_cast<Index>((*same)->parameters().size());
-    source = std::move(*same);
+    ErrorSourcePtr same = TRY(make_error_source(source->name(), *cell));
+    for (const Index k : places(*source, *model.cell, *same, *cell)) went.push_back(first + k);
+    first += static_cast<Index>(same->parameters().size());
+    source = std::move(same);
   }
   moved.values = moved.prior_values();
   moved.values(went) = model.values;
@@ -202,11 +200,10 @@ struct Anew {
 Result<Anew> begin_anew(CalibrationProblem& problem, const std::vector<std::string>& only, Refit& refit) {
   Anew anew;
   for (const std::string& name : only) {
-    Result<std::string> source = named_source(problem.model, name, refit.place);
-    if (!source) return tl::make_unexpected(source.error());
-    anew.sources.push_back(std::move(*source));
+    std::string source = TRY(named_source(problem.model, name, refit.place));
+    anew.sources.push_back(std::move(source));
   }
-  if (const Status fit = check_needs(problem); !fit) return tl::make_unexpected(fit.error());
+  TRY(check_needs(problem));
   anew.parameters = parameters_of(problem.model, anew.sources, problem.batch);
   const std::vector<Parameter> parameters = problem.model.parameters();
   refit.prior_variance = VectorXd::Zero(static_cast<Index>(parameters.size()));
@@ -242,18 +239,15 @@ Result<Refit> refit(const CalibrationResult& known, const std::shared_ptr<const 
     return refused("no measurements to calibrate with").in("batch " + batch.id).beyond(0, 1);
   if (only.empty()) return failure(ErrorCode::kUsage, "no error source is named to be identified anew");
   Refit refit;
-  Result<PhysicalModel> model = in_cell(known.model, cell, &refit.place);
-  if (!model) return tl::make_unexpected(model.error());
-  CalibrationProblem problem{std::move(*model), batch};
-  const Result<Anew> anew = begin_anew(problem, only, refit);
-  if (!anew) return tl::make_unexpected(anew.error());
-  if (const Status placed = place_anew(problem, *anew, refit); !placed) return tl::make_unexpected(placed.error());
-  for (const bool one : anew->parameters) options.held.push_back(!one);
-  Result<CalibrationResult> found = identify(problem, options);
-  if (!found) return tl::make_unexpected(found.error());
-  refit.result = std::move(*found);
-  for (std::size_t k = 0; k < anew->parameters.size(); ++k) {
-    if (!anew->parameters[k])
+  PhysicalModel model = TRY(in_cell(known.model, cell, &refit.place));
+  CalibrationProblem problem{std::move(model), batch};
+  const Anew anew = TRY(begin_anew(problem, only, refit));
+  TRY(place_anew(problem, anew, refit));
+  for (const bool one : anew.parameters) options.held.push_back(!one);
+  CalibrationResult found = TRY(identify(problem, options));
+  refit.result = std::move(found);
+  for (std::size_t k = 0; k < anew.parameters.size(); ++k) {
+    if (!anew.parameters[k])
       refit.result.model.values(static_cast<Index>(k)) = problem.model.values(static_cast<Index>(k));
   }
   add_dependence(refit, problem);

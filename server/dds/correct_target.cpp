@@ -16,13 +16,11 @@ Result<Target> from_wire(const wire::Target& wanted, const Chain& chain, const s
   Target target;
   target.joint_target = wanted.kind() == wire::TARGET_JOINTS;
   if (!target.joint_target) {
-    const auto X_BT = trammel::from_wire(wanted.pose(), where);
-    if (!X_BT) return tl::make_unexpected(X_BT.error());
-    target.X_BT = *X_BT;
+    const auto X_BT = TRY(trammel::from_wire(wanted.pose(), where));
+    target.X_BT = X_BT;
   }
   PoseContext comes;
-  if (const Status known = read_approach(wanted.approach(), chain, where, comes); !known)
-    return tl::make_unexpected(known.error());
+  TRY(read_approach(wanted.approach(), chain, where, comes));
   target.direction = std::move(comes.direction);
   target.temperature = comes.temperature;
   target.time = comes.time;
@@ -36,9 +34,8 @@ Result<Target> from_wire(const wire::Target& wanted, const Chain& chain, const s
     target.conf = wanted.conf();
     return target;
   }
-  const auto seed = trammel::from_wire(wanted.joints_rad(), chain, where);
-  if (!seed) return tl::make_unexpected(seed.error());
-  target.seed = *seed;
+  const auto seed = TRY(trammel::from_wire(wanted.joints_rad(), chain, where));
+  target.seed = seed;
   return target;
 }
 
@@ -110,19 +107,16 @@ class PortionedCorrections final : public PortionedAnswer<wire::CorrectTargetRep
 
 Result<Handlers::Corrections> Handlers::begin(const wire::CorrectTargetRequest& request) {
   const auto& wanted = request.targets();
-  auto subject = subjects_.find(request.about());
-  if (!subject) return tl::make_unexpected(subject.error());
-  const Chain& chain = subject->served->model.cell().robot;
+  auto subject = TRY(subjects_.find(request.about()));
+  const Chain& chain = subject.served->model.cell().robot;
 
   std::vector<Target> targets;
   targets.reserve(wanted.size());
   for (std::size_t i = 0; i < wanted.size(); ++i) {
-    const auto target = from_wire(wanted[i], chain, fmt::format("target {}", i + 1));
-    if (!target) return tl::make_unexpected(target.error());
-    targets.push_back(*target);
+    const auto target = TRY(from_wire(wanted[i], chain, fmt::format("target {}", i + 1)));
+    targets.push_back(target);
   }
-  return std::make_unique<PortionedCorrections>(std::move(*subject), std::move(targets), trainer_.recent_poses(),
-                                                work_);
+  return std::make_unique<PortionedCorrections>(std::move(subject), std::move(targets), trainer_.recent_poses(), work_);
 }
 
 Result<wire::CorrectTargetReply> Handlers::answer(const wire::CorrectTargetRequest& request) {

@@ -113,10 +113,9 @@ class ThreadName {
 
 Result<std::optional<wire::Security>> security_of(const std::string& folder) {
   if (folder.empty()) return std::nullopt;
-  auto security = wire::read_security(folder);
-  if (!security) return tl::make_unexpected(security.error());
-  if (const Status serves = wire::check_serves(*security); !serves) return tl::make_unexpected(serves.error());
-  return std::optional(std::move(*security));
+  auto security = TRY(wire::read_security(folder));
+  TRY(wire::check_serves(security));
+  return std::optional(std::move(security));
 }
 
 }  // namespace
@@ -127,43 +126,37 @@ class DdsService::Running {
                                                               const ModelRegistry& registry,
                                                               const PacketListener& packet_listener,
                                                               const CallListener& call_listener) {
-    if (const Status fit = check_names(options, trainer); !fit) return tl::make_unexpected(fit.error());
+    TRY(check_names(options, trainer));
     auto library = std::make_optional<ThreadName>("dds");
-    auto port = PortLock::take(options.address, options.port);
-    if (!port) return tl::make_unexpected(port.error());
+    auto port = TRY(PortLock::take(options.address, options.port));
     auto events = std::make_unique<ServiceEvents>();
     const auto heard = std::make_shared<wire::HeardOfItself>();
     const auto dropped = std::make_shared<wire::DropCounts>();
-    const auto security = security_of(options.security);
-    if (!security) return tl::make_unexpected(security.error());
-    auto participant = wire::make_participant({"trammel server " + options.server_id,
-                                               options.domain,
-                                               options.address,
-                                               options.port,
-                                               {},
-                                               heard,
-                                               dropped,
-                                               {},
-                                               *security},
-                                              events.get());
-    if (!participant) return tl::make_unexpected(participant.error());
-    wire::dds::Subscriber* subscriber = (*participant)->create_subscriber(wire::subscriber_qos({}));
+    const auto security = TRY(security_of(options.security));
+    auto participant = TRY(wire::make_participant({"trammel server " + options.server_id,
+                                                   options.domain,
+                                                   options.address,
+                                                   options.port,
+                                                   {},
+                                                   heard,
+                                                   dropped,
+                                                   {},
+                                                   security},
+                                                  events.get()));
+    wire::dds::Subscriber* subscriber = participant->create_subscriber(wire::subscriber_qos({}));
     if (subscriber == nullptr) return failure(ErrorCode::kInternal, "cannot create the subscriber of requests");
-    auto topics = StateTopics::open(**participant);
-    if (!topics) return tl::make_unexpected(topics.error());
-    auto echo = StatusEcho::open(**participant, *subscriber, topics->status_writer(), *heard);
-    if (!echo) return tl::make_unexpected(echo.error());
+    auto topics = TRY(StateTopics::open(*participant));
+    auto echo = TRY(StatusEcho::open(*participant, *subscriber, topics.status_writer(), *heard));
     library.reset();
 
-    std::unique_ptr<Running> running(new Running(options, trainer, store, registry, std::move(*port), std::move(events),
-                                                 std::move(*participant), *subscriber, *topics, std::move(*echo)));
+    std::unique_ptr<Running> running(new Running(options, trainer, store, registry, std::move(port), std::move(events),
+                                                 std::move(participant), *subscriber, topics, std::move(echo)));
     running->core_.listener = call_listener;
-    auto recorder = RequestRecorder::open(options.record);
-    if (!recorder) return tl::make_unexpected(recorder.error());
-    running->recorder_ = std::move(*recorder);
+    auto recorder = TRY(RequestRecorder::open(options.record));
+    running->recorder_ = std::move(recorder);
     running->core_.recorder = running->recorder_.get();
     running->handlers_.set_names(&running->events_->names());
-    if (const Status opened = running->open_endpoints(); !opened) return tl::make_unexpected(opened.error());
+    TRY(running->open_endpoints());
     for (Lane* lane : running->lanes()) lane->start();
     running->replies_thread_ =
         std::jthread([r = running.get()](const std::stop_token& stop) { r->channels_.deliver(stop); });
@@ -172,7 +165,7 @@ class DdsService::Running {
     running->packet_listener_ = packet_listener;
     running->status_thread_ = std::jthread([r = running.get()](const std::stop_token& stop) { r->tell_status(stop); });
     running->watchdog_ = std::make_unique<Watchdog>(running->moving_parts(heard));
-    if (const Status told = running->tell_place(); !told) return tl::make_unexpected(told.error());
+    TRY(running->tell_place());
     return running;
   }
 
@@ -269,17 +262,15 @@ class DdsService::Running {
   Status tell_place() {
     if (options_.discovery_servers.empty()) return {};
     const wire::Place place{{options_.address, options_.port}, options_.domain, options_.server_id};
-    auto beacon = wire::announce_place(place, options_.discovery_servers);
-    if (!beacon) return tl::make_unexpected(beacon.error());
-    beacon_ = std::move(*beacon);
+    auto beacon = TRY(wire::announce_place(place, options_.discovery_servers));
+    beacon_ = std::move(beacon);
     return {};
   }
 
   Status open_endpoints() {
     const auto open = [this]<typename Operation>(Operation, Lanes lanes) -> Status {
-      auto endpoint = RequestEndpoint<Operation>::open(core_, lanes);
-      if (!endpoint) return tl::make_unexpected(endpoint.error());
-      endpoints_.push_back(std::move(*endpoint));
+      auto endpoint = TRY(RequestEndpoint<Operation>::open(core_, lanes));
+      endpoints_.push_back(std::move(endpoint));
       return {};
     };
     const Lanes others{changes_, reads_};
@@ -295,17 +286,15 @@ class DdsService::Running {
     if (opened && options_.ros2) opened = open_ros2<wire::Ros2PredictErrors>(predictions_);
     if (opened && options_.ros2) opened = open_ros2<wire::Ros2CorrectTargets>(corrections_);
     if (!opened) return opened;
-    auto old = OldContract::open(options_.server_id, *participant_, core_.subscriber, channels_);
-    if (!old) return tl::make_unexpected(old.error());
-    old_contract_ = std::move(*old);
+    auto old = TRY(OldContract::open(options_.server_id, *participant_, core_.subscriber, channels_));
+    old_contract_ = std::move(old);
     return {};
   }
 
   template <typename Ros>
   Status open_ros2(Lane& lane) {
-    auto endpoint = open_ros2_endpoint<Ros>(core_, lane, replying_);
-    if (!endpoint) return tl::make_unexpected(endpoint.error());
-    endpoints_.push_back(std::move(*endpoint));
+    auto endpoint = TRY(open_ros2_endpoint<Ros>(core_, lane, replying_));
+    endpoints_.push_back(std::move(endpoint));
     return {};
   }
 
@@ -438,11 +427,10 @@ Status DdsService::start() {
     if (running_) return {};
   }
   // Without the lock: its workers may publish.
-  auto started = Running::start(options_, trainer_, store_, registry_, packet_listener_, call_listener_);
-  if (!started) return tl::make_unexpected(started.error());
+  auto started = TRY(Running::start(options_, trainer_, store_, registry_, packet_listener_, call_listener_));
   {
     const MutexLock lock(mutex_);
-    running_ = std::move(*started);
+    running_ = std::move(started);
   }
   for (const auto& model : registry_.all()) publish_model(model->cell);
   return {};

@@ -8,34 +8,32 @@ namespace trammel {
 
 Result<wire::DiagnoseReply> Handlers::answer(const wire::DiagnoseRequest& request) {
   const std::string& cell = request.about().cell();
-  if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
-  const auto job = trainer_.diagnose(
+  TRY(subjects_.cell(request.about()));
+  const auto job = TRY(trainer_.diagnose(
       cell, request.batch_id(), request.csv(), false,
       ChangeId{request.change_id().to_string(), in_few_words("diagnose", cell, {request.batch_id(), request.csv()}),
-               who(request.header())});
-  if (!job) return tl::make_unexpected(job.error());
+               who(request.header())}));
   wire::DiagnoseReply reply;
   if (const auto served = registry_.in_force(cell)) reply.model(to_wire(*served, true, unix_now_s()));
-  reply.job(*job);
+  reply.job(job);
   return reply;
 }
 
 Result<wire::CheckHealthReply> Handlers::answer(const wire::CheckHealthRequest& request) {
   const std::string& cell = request.about().cell();
-  if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
+  TRY(subjects_.cell(request.about()));
   std::optional<double> tolerance;
   if (!std::isnan(request.tolerance_mm())) tolerance = request.tolerance_mm();
   if (tolerance && !(*tolerance > 0 && std::isfinite(*tolerance))) {
     return failure(ErrorCode::kUsage, "a tolerance of {} mm", *tolerance).of("tolerance_mm").beyond(*tolerance, 0);
   }
-  const auto job =
-      trainer_.check(cell, request.batch_id(), request.csv(), tolerance,
-                     ChangeId{request.change_id().to_string(),
-                              in_few_words("check", cell, {request.batch_id(), request.csv()}), who(request.header())});
-  if (!job) return tl::make_unexpected(job.error());
+  const auto job = TRY(trainer_.check(
+      cell, request.batch_id(), request.csv(), tolerance,
+      ChangeId{request.change_id().to_string(), in_few_words("check", cell, {request.batch_id(), request.csv()}),
+               who(request.header())}));
   wire::CheckHealthReply reply;
   if (const auto served = registry_.in_force(cell)) reply.model(to_wire(*served, true, unix_now_s()));
-  reply.job(*job);
+  reply.job(job);
   return reply;
 }
 

@@ -8,22 +8,20 @@ Result<wire::ManageModelsReply> Handlers::answer(const wire::ManageModelsRequest
     return unsupported<wire::ManageModelsReply>("force");
   if (request.action() == wire::MANAGE_BACKUP) return unsupported<wire::ManageModelsReply>("action");
   const std::string& cell = request.about().cell();
-  if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
-  const auto version = changed(cell, request);
-  if (!version) return tl::make_unexpected(version.error());
+  TRY(subjects_.cell(request.about()));
+  const auto version = TRY(changed(cell, request));
   wire::ManageModelsReply reply;
-  reply.version(*version);
+  reply.version(version);
   if (const auto served = registry_.in_force(cell)) reply.model(to_wire(*served, true, unix_now_s()));
   return reply;
 }
 
 Result<int> Handlers::changed(const std::string& cell, const wire::ManageModelsRequest& request) {
-  const auto expected = expected_version(request.change());
-  if (!expected) return tl::make_unexpected(expected.error());
+  const auto expected = TRY(expected_version(request.change()));
   const auto under = [&](const std::string& asked) {
     ChangeId id{request.change().id().to_string(), asked, who(request.header())};
     id.reason = request.reason();
-    id.expected_version = *expected;
+    id.expected_version = expected;
     return id;
   };
   switch (request.action()) {
@@ -46,26 +44,23 @@ Result<int> Handlers::changed(const std::string& cell, const wire::ManageModelsR
 }
 
 Status Handlers::cancel(const std::string& cell, std::int64_t job, const ChangeId& by) {
-  const auto asked = trainer_.progress(job);
-  if (!asked) return tl::make_unexpected(asked.error());
-  if (asked->cell != cell)
+  const auto asked = TRY(trainer_.progress(job));
+  if (asked.cell != cell)
     return failure(ErrorCode::kNotFound, "job {} is not of cell {}", job, cell).of("job").with_value(job);
   return trainer_.cancel(job, by);
 }
 
 Result<wire::ReleaseBatchesReply> Handlers::answer(const wire::ReleaseBatchesRequest& request) {
   const std::string& cell = request.about().cell();
-  if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
-  const auto job = released(cell, request);
-  if (!job) return tl::make_unexpected(job.error());
+  TRY(subjects_.cell(request.about()));
+  const auto job = TRY(released(cell, request));
   wire::ReleaseBatchesReply reply;
-  reply.job(*job);
+  reply.job(job);
   return reply;
 }
 
 Result<std::int64_t> Handlers::released(const std::string& cell, const wire::ReleaseBatchesRequest& request) {
-  const auto expected = expected_version(request.change());
-  if (!expected) return tl::make_unexpected(expected.error());
+  const auto expected = TRY(expected_version(request.change()));
   const auto& batches = request.batch_ids();
   const bool trains = request.action() == wire::RELEASE_AND_TRAIN;
   const bool discards = request.action() == wire::RELEASE_DISCARD;
@@ -81,7 +76,7 @@ Result<std::int64_t> Handlers::released(const std::string& cell, const wire::Rel
                            cell, {fmt::format("{}", fmt::join(batches, "\n")), request.level(), request.bias()}),
               who(request.header())};
   id.reason = request.reason();
-  id.expected_version = *expected;
+  id.expected_version = expected;
   if (discards) return trainer_.discard(cell, batches.front(), id).map([] { return std::int64_t{0}; });
   if (!trains) return trainer_.release(cell, batches.front(), id).map([] { return std::int64_t{0}; });
   return trainer_.retrain(cell, batches, request.level(), request.bias(), Trainer::Quarantine::kReleased, id);

@@ -40,16 +40,14 @@ OldContract::~OldContract() {
 
 template <typename Old>
 Status OldContract::add_operation(wire::dds::DomainParticipant& participant) {
-  const auto requests = wire::make_old_request_topic<Old>(participant);
-  if (!requests) return tl::make_unexpected(requests.error());
-  const auto replies = wire::make_old_reply_topic<Old>(participant);
-  if (!replies) return tl::make_unexpected(replies.error());
-  channels_.add_topic(*replies, nullptr);
-  operations_[*requests] = {(*replies)->get_name(), [this](const contract_1::Request& request) {
-                              const auto reply = std::make_shared<typename Old::Reply::type>();
-                              reply->header(refusal_of(request, server_id_));
-                              return std::shared_ptr<void>(reply);
-                            }};
+  const auto requests = TRY(wire::make_old_request_topic<Old>(participant));
+  const auto replies = TRY(wire::make_old_reply_topic<Old>(participant));
+  channels_.add_topic(replies, nullptr);
+  operations_[requests] = {replies->get_name(), [this](const contract_1::Request& request) {
+                             const auto reply = std::make_shared<typename Old::Reply::type>();
+                             reply->header(refusal_of(request, server_id_));
+                             return std::shared_ptr<void>(reply);
+                           }};
   return {};
 }
 

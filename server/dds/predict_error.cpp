@@ -48,15 +48,13 @@ wire::PredictedError to_wire(const ErrorPrediction& prediction) {
 /// The pose as the model is asked for it; refuses what the cell's arm cannot do.
 Result<PoseContext> context_of(const wire::CommandedJoints& wanted, const Subject& subject, const std::string& where) {
   const Cell& cell = subject.served->model.cell();
-  auto q = from_wire(wanted.joints_rad(), cell.robot, where);
-  if (!q) return tl::make_unexpected(q.error());
+  auto q = TRY(from_wire(wanted.joints_rad(), cell.robot, where));
   PoseContext pose;
-  pose.q = std::move(*q);
+  pose.q = std::move(q);
   pose.tool = subject.tool;
   pose.payload = subject.payload;
   pose.served = true;
-  if (const Status known = read_approach(wanted.approach(), cell.robot, where, pose); !known)
-    return tl::make_unexpected(known.error());
+  TRY(read_approach(wanted.approach(), cell.robot, where, pose));
   if (const Status possible = check_pose(pose, cell); !possible) return Failure(possible.error()).in(where);
   return pose;
 }
@@ -92,20 +90,18 @@ class PortionedPredictions final : public PortionedAnswer<wire::PredictErrorRepl
 }  // namespace
 
 Result<Handlers::Predictions> Handlers::begin(const wire::PredictErrorRequest& request) {
-  auto subject = subjects_.find(request.about());
-  if (!subject) return tl::make_unexpected(subject.error());
+  auto subject = TRY(subjects_.find(request.about()));
   std::vector<PoseContext> poses;
   poses.reserve(request.poses().size());
   for (std::size_t i = 0; i < request.poses().size(); ++i) {
-    auto pose = context_of(request.poses()[i], *subject, fmt::format("joint vector {}", i + 1));
-    if (!pose) return tl::make_unexpected(pose.error());
-    poses.push_back(std::move(*pose));
+    auto pose = TRY(context_of(request.poses()[i], subject, fmt::format("joint vector {}", i + 1)));
+    poses.push_back(std::move(pose));
   }
   // The last ones stand for all.
   const std::size_t told = std::min<std::size_t>(poses.size(), kPosesTold);
   for (std::size_t i = poses.size() - told; i < poses.size(); ++i)
     trainer_.recent_poses().add(request.about().cell(), poses[i]);
-  return std::make_unique<PortionedPredictions>(std::move(*subject), std::move(poses), work_);
+  return std::make_unique<PortionedPredictions>(std::move(subject), std::move(poses), work_);
 }
 
 Result<wire::PredictErrorReply> Handlers::answer(const wire::PredictErrorRequest& request) {

@@ -35,26 +35,24 @@ Result<ReadModelsReply> list_of(const Result<std::vector<StoredBatch>>& batches)
 /// What the store has of a cell's checks, and of how its model in force was judged.
 Result<CellHealth> health_in(const Store& store, const ModelRegistry& registry, const std::string& cell,
                              std::int64_t since, std::size_t most) {
-  const auto checks = store.health_checks(cell, std::max<std::int64_t>(since, 0), most);
-  if (!checks) return tl::make_unexpected(checks.error());
-  const auto record = store.in_force_record(cell);
-  if (!record) return tl::make_unexpected(record.error());
+  const auto checks = TRY(store.health_checks(cell, std::max<std::int64_t>(since, 0), most));
+  const auto record = TRY(store.in_force_record(cell));
   CellHealth health{cell};
-  for (const StoredCheck& one : *checks) health.checks.push_back({one.job, one.at, one.batch_ids, one.findings});
+  for (const StoredCheck& one : checks) health.checks.push_back({one.job, one.at, one.batch_ids, one.findings});
   const auto model = registry.in_force(cell);
   if (!model) return health;
   ServedOnRecord& served = health.served.emplace();
   served.version = model->version;
   served.model = model->model.provenance().id;
   served.between_sessions = session_changes(model->model);
-  if (!*record || (*record)->version != model->version) return health;  // served from a copy
-  served.since = (*record)->since;
-  served.version_before = (*record)->before;
-  const JobOutcome judged = (*record)->judged.value_or(JobOutcome());
+  if (!record || record->version != model->version) return health;  // served from a copy
+  served.since = record->since;
+  served.version_before = record->before;
+  const JobOutcome judged = record->judged.value_or(JobOutcome());
   served.before = judged.before;
   served.after = judged.after;
   served.limit = judged.limit;
-  served.why = ((*record)->judged_when_made ? "when it was made: " : "") + judged.why;
+  served.why = (record->judged_when_made ? "when it was made: " : "") + judged.why;
   return health;
 }
 
@@ -81,7 +79,7 @@ Result<ReadModelsReply> Handlers::answer(const ReadModelsRequest& request) {
   if (request.what() == wire::READ_FLEET) return fleet();
   if (request.what() > wire::READ_REPLAY) return unsupported<ReadModelsReply>("what");
   if (!cell.empty() || !of_all) {
-    if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
+    TRY(subjects_.cell(request.about()));
   }
   auto reply = read(cell, request);
   if (!reply) return reply;
@@ -117,30 +115,26 @@ Result<ReadModelsReply> Handlers::read(const std::string& cell, const ReadModels
 }
 
 Result<ReadModelsReply> Handlers::job_of(std::int64_t job) const {
-  const auto progress = trainer_.progress(job);
-  if (!progress) return tl::make_unexpected(progress.error());
-  const auto asked = store_.job(job);
-  if (!asked) return tl::make_unexpected(asked.error());
+  const auto progress = TRY(trainer_.progress(job));
+  const auto asked = TRY(store_.job(job));
   ReadModelsReply reply;
-  reply.jobs().push_back(to_wire(Trainer::DatedJob{*asked, *progress}));
+  reply.jobs().push_back(to_wire(Trainer::DatedJob{asked, progress}));
   return reply;
 }
 
 Result<ReadModelsReply> Handlers::models_of(const std::string& cell) const {
-  const auto models = store_.models(cell);
-  if (!models) return tl::make_unexpected(models.error());
-  const auto batches = store_.batches(cell);
-  if (!batches) return tl::make_unexpected(batches.error());
+  const auto models = TRY(store_.models(cell));
+  const auto batches = TRY(store_.batches(cell));
   std::map<std::string, std::string> hashes;  // by batch; of several batches together none is stored
-  for (const StoredBatch& batch : *batches) hashes[batch.id] = batch.hash;
+  for (const StoredBatch& batch : batches) hashes[batch.id] = batch.hash;
   ReadModelsReply reply;
   const auto served = registry_.in_force(cell);
   const std::int64_t now = unix_now_s();
-  for (std::size_t i = first_of_last(*models, wire::MAX_VERSIONS); i < models->size(); ++i) {
-    reply.models().push_back(to_wire((*models)[i], now));
-    const auto hash = hashes.find((*models)[i].batch_id);
+  for (std::size_t i = first_of_last(models, wire::MAX_VERSIONS); i < models.size(); ++i) {
+    reply.models().push_back(to_wire(models[i], now));
+    const auto hash = hashes.find(models[i].batch_id);
     if (hash != hashes.end()) reply.models().back().batch_hash(hash->second);
-    if (served && served->version == (*models)[i].version) reply.models().back().notes(to_wire(served->notes));
+    if (served && served->version == models[i].version) reply.models().back().notes(to_wire(served->notes));
   }
   return reply;
 }
@@ -149,26 +143,22 @@ Result<ReadModelsReply> Handlers::exported(const std::string& cell, int asked) c
   const auto in_force = registry_.in_force(cell);
   if (asked == 0 && !in_force) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell).of("cell");
   const int version = asked == 0 ? in_force->version : asked;
-  const auto model = in_force && version == in_force->version ? Result<CompensatedModel>(in_force->model)
-                                                              : store_.model(cell, version);
-  if (!model) return tl::make_unexpected(model.error());
+  const auto model = TRY(in_force && version == in_force->version ? Result<CompensatedModel>(in_force->model)
+                                                                  : store_.model(cell, version));
   ReadModelsReply reply;
   reply.version(version);
-  reply.text(serialize(*model));
-  const Status fits = check_fits(fmt::format("cell {} version {}", cell, version), reply.text().size());
-  if (!fits) return tl::make_unexpected(fits.error());
+  reply.text(serialize(model));
+  TRY(check_fits(fmt::format("cell {} version {}", cell, version), reply.text().size()));
   return reply;
 }
 
 Result<ReadModelsReply> Handlers::replayed(const std::string& cell, int version) const {
   const auto in_force = registry_.in_force(cell);
   if (!in_force) return failure(ErrorCode::kNotFound, "cell {} has no model in force", cell).of("cell");
-  const auto other = version == 0 || version == in_force->version ? Result<CompensatedModel>(in_force->model)
-                                                                  : store_.model(cell, version);
-  if (!other) return tl::make_unexpected(other.error());
+  const auto other = TRY(version == 0 || version == in_force->version ? Result<CompensatedModel>(in_force->model)
+                                                                      : store_.model(cell, version));
   const WorkVersions versions{cell, in_force->version, version};
-  const WorkAsked work =
-      work_asked(in_force->model, version == 0 ? nullptr : &*other, trainer_.recent_poses().of(cell));
+  const WorkAsked work = work_asked(in_force->model, version == 0 ? nullptr : &other, trainer_.recent_poses().of(cell));
   ReadModelsReply reply;
   reply.version(in_force->version);
   reply.text(work_json(work, versions, in_force->model.cell().robot).dump());
@@ -176,55 +166,49 @@ Result<ReadModelsReply> Handlers::replayed(const std::string& cell, int version)
 }
 
 Result<ReadModelsReply> Handlers::jobs_of(const std::string& cell) const {
-  const auto jobs = trainer_.jobs(cell);
-  if (!jobs) return tl::make_unexpected(jobs.error());
+  const auto jobs = TRY(trainer_.jobs(cell));
   ReadModelsReply reply;
-  for (std::size_t i = first_of_last(*jobs, wire::MAX_JOBS); i < jobs->size(); ++i)
-    reply.jobs().push_back(to_wire((*jobs)[i]));
+  for (std::size_t i = first_of_last(jobs, wire::MAX_JOBS); i < jobs.size(); ++i)
+    reply.jobs().push_back(to_wire(jobs[i]));
   return reply;
 }
 
 Result<ReadModelsReply> Handlers::batch_of(const std::string& cell, const std::string& id) const {
-  auto batch = store_.batch(cell, id);
-  if (!batch) return tl::make_unexpected(batch.error());
+  auto batch = TRY(store_.batch(cell, id));
   ReadModelsReply reply;
-  if (const Status fits = check_fits("batch " + id, batch->csv.size()); !fits) return tl::make_unexpected(fits.error());
-  reply.batches().push_back(to_wire(*batch));
-  reply.text(std::move(batch->csv));
+  TRY(check_fits("batch " + id, batch.csv.size()));
+  reply.batches().push_back(to_wire(batch));
+  reply.text(std::move(batch.csv));
   return reply;
 }
 
 Result<ReadModelsReply> Handlers::audit_of(const std::string& cell, std::int64_t since, std::size_t most) const {
-  const auto trail = store_.audit({cell, std::max<std::int64_t>(since, 0), most});
-  if (!trail) return tl::make_unexpected(trail.error());
+  const auto trail = TRY(store_.audit({cell, std::max<std::int64_t>(since, 0), most}));
   ReadModelsReply reply;
-  reply.text(audit_json(*trail).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  reply.text(audit_jsontrail.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   if (const Status fits = check_fits("the audit trail", reply.text().size()); !fits)
     return Failure(fits.error()).next("ask for fewer rows");
   return reply;
 }
 
 Result<ReadModelsReply> Handlers::findings_of(const std::string& cell, std::int64_t job, bool page) const {
-  const auto asked = trainer_.progress(job);
-  if (!asked) return tl::make_unexpected(asked.error());
-  if (asked->cell != cell)
+  const auto asked = TRY(trainer_.progress(job));
+  if (asked.cell != cell)
     return failure(ErrorCode::kNotFound, "job {} is not of cell {}", job, cell).of("job").with_value(job);
-  auto found = trainer_.diagnosis(job);
-  if (!found) return tl::make_unexpected(found.error());
+  auto found = TRY(trainer_.diagnosis(job));
   ReadModelsReply reply;
-  if (page) reply.page_html(std::move(found->page));
-  const std::size_t bytes = found->findings.size() + reply.page_html().size();
+  if (page) reply.page_html(std::move(found.page));
+  const std::size_t bytes = found.findings.size() + reply.page_html().size();
   if (const Status fits = check_fits(fmt::format("what job {} found", job), bytes); !fits)
     return Failure(fits.error()).next("ask without the page");
-  reply.text(std::move(found->findings));
+  reply.text(std::move(found.findings));
   return reply;
 }
 
 Result<ReadModelsReply> Handlers::fleet() const {
   std::map<std::string, std::string> checks;  // the last of each cell
-  const auto jobs = trainer_.jobs("");
-  if (!jobs) return tl::make_unexpected(jobs.error());
-  for (const Trainer::DatedJob& job : *jobs) {
+  const auto jobs = TRY(trainer_.jobs(""));
+  for (const Trainer::DatedJob& job : jobs) {
     if (job.asked.kind != JobKind::kCheck || job.progress.stage != JobStage::kDone) continue;
     if (const auto found = trainer_.diagnosis(job.asked.id)) checks[job.asked.cell] = found->findings;
   }
@@ -239,7 +223,7 @@ Result<ReadModelsReply> Handlers::fleet() const {
   }
   ReadModelsReply reply;
   reply.text(fleet_json(cells).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
-  if (const Status fits = check_fits("the fleet", reply.text().size()); !fits) return tl::make_unexpected(fits.error());
+  TRY(check_fits("the fleet", reply.text().size()));
   return reply;
 }
 
@@ -247,9 +231,8 @@ Result<ReadModelsReply> Handlers::health_of(const std::string& cell, std::int64_
   nlohmann::ordered_json cells = nlohmann::ordered_json::array();
   for (const auto& [name, known] : trainer_.cells()) {
     if (!cell.empty() && name != cell) continue;
-    const auto health = health_in(store_, registry_, name, since, most);
-    if (!health) return tl::make_unexpected(health.error());
-    cells.push_back(cell_health_json(*health));
+    const auto health = TRY(health_in(store_, registry_, name, since, most));
+    cells.push_back(cell_health_json(health));
   }
   ReadModelsReply reply;
   const nlohmann::ordered_json answer = {

@@ -47,7 +47,7 @@ Result<std::shared_ptr<const Cell>> SubjectFinder::cell(const wire::Context& con
 }
 
 Result<Subject> SubjectFinder::find(const wire::Context& context) {
-  if (const auto known = cell(context); !known) return tl::make_unexpected(known.error());
+  TRY(cell(context));
   if (const auto why = trainer_.why_apart(context.cell()))
     return failure(ErrorCode::kConflict, "{}", *why).of("cell").with_text(context.cell());
   const auto [in_force, comes] = registry_.ready(context.cell());
@@ -59,9 +59,8 @@ Result<Subject> SubjectFinder::find(const wire::Context& context) {
   }
   Subject subject{in_force, true, {}, {}};
   if (const auto wanted = version_number(context.model()); wanted && (!in_force || in_force->version != *wanted)) {
-    auto stored = version(context.cell(), *wanted);
-    if (!stored) return tl::make_unexpected(stored.error());
-    subject.served = std::move(*stored);
+    auto stored = TRY(version(context.cell(), *wanted));
+    subject.served = std::move(stored);
     subject.in_force = false;
   } else if (!in_force) {
     return failure(ErrorCode::kNotFound, "cell {} has no model in force", context.cell())
@@ -76,15 +75,11 @@ Result<Subject> SubjectFinder::find(const wire::Context& context) {
   }
 
   const Cell& trained_for = subject.served->model.cell();
-  const auto tool = resolve_tool(trained_for, context.tool());
-  if (!tool) return tl::make_unexpected(tool.error());
-  const auto payload = resolve_payload(trained_for, context.payload());
-  if (!payload) return tl::make_unexpected(payload.error());
-  if (const Status known = subject.served->model.check_trained_with(*tool, *payload); !known) {
-    return tl::make_unexpected(known.error());
-  }
-  subject.tool = *tool;
-  subject.payload = *payload;
+  const auto tool = TRY(resolve_tool(trained_for, context.tool()));
+  const auto payload = TRY(resolve_payload(trained_for, context.payload()));
+  TRY(subject.served->model.check_trained_with(tool, payload));
+  subject.tool = tool;
+  subject.payload = payload;
   return subject;
 }
 
@@ -96,9 +91,8 @@ Result<std::shared_ptr<const ServedModel>> SubjectFinder::version(const std::str
     if (found != loaded_.end()) return *found;
   }
   // Without the lock: other requests do not wait while a model is read.
-  auto model = trainer_.load_for_service(cell, version);
-  if (!model) return tl::make_unexpected(model.error());
-  auto served = std::make_shared<const ServedModel>(ServedModel{cell, version, std::move(*model)});
+  auto model = TRY(trainer_.load_for_service(cell, version));
+  auto served = std::make_shared<const ServedModel>(ServedModel{cell, version, std::move(model)});
   const MutexLock lock(mutex_);
   loaded_.push_front(served);
   if (loaded_.size() > kVersionsInMemory) loaded_.pop_back();

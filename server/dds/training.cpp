@@ -39,16 +39,15 @@ std::string Handlers::who(const wire::RequestHeader& header) const {
 }
 
 Result<wire::SubmitMeasurementsReply> Handlers::answer(const wire::SubmitMeasurementsRequest& request) {
-  if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
+  TRY(subjects_.cell(request.about()));
   if (request.batch_id().empty()) return refused("a batch without an id").of("batch_id");
   const auto job =
-      trainer_.submit(request.about().cell(), request.batch_id(), request.csv(),
-                      request.change_id().to_string().empty() ? request_id_text(request.header().request_id())
-                                                              : request.change_id().to_string(),
-                      who(request.header()));
-  if (!job) return tl::make_unexpected(job.error());
+      TRY(trainer_.submit(request.about().cell(), request.batch_id(), request.csv(),
+                          request.change_id().to_string().empty() ? request_id_text(request.header().request_id())
+                                                                  : request.change_id().to_string(),
+                          who(request.header())));
   wire::SubmitMeasurementsReply reply;
-  reply.job(*job);
+  reply.job(job);
   return reply;
 }
 
@@ -56,11 +55,10 @@ Result<wire::TrainReply> Handlers::answer(const wire::TrainRequest& request) {
   if (!request.batch_rule().empty()) return unsupported<wire::TrainReply>("batch_rule");
   if (!request.prior().empty()) return unsupported<wire::TrainReply>("prior");
   if (request.diagnosis() != 0) return unsupported<wire::TrainReply>("diagnosis");
-  if (const auto known = subjects_.cell(request.about()); !known) return tl::make_unexpected(known.error());
-  const auto job = trained(request);
-  if (!job) return tl::make_unexpected(job.error());
+  TRY(subjects_.cell(request.about()));
+  const auto job = TRY(trained(request));
   wire::TrainReply reply;
-  reply.job(*job);
+  reply.job(job);
   return reply;
 }
 
@@ -68,15 +66,14 @@ Result<std::int64_t> Handlers::trained(const wire::TrainRequest& request) {
   const std::string& cell = request.about().cell();
   const auto& batches = request.batch_ids();
   const bool diagnosed = request.kind() == wire::TRAIN_DIAGNOSED;
-  if (const Status sensible = check_training(request); !sensible) return tl::make_unexpected(sensible.error());
-  const auto expected = expected_version(request.change());
-  if (!expected) return tl::make_unexpected(expected.error());
+  TRY(check_training(request));
+  const auto expected = TRY(expected_version(request.change()));
   ChangeId id{
       request.change().id().to_string(),
       in_few_words(diagnosed ? "diagnose and train" : "train", cell,
                    {fmt::format("{}", fmt::join(batches, "\n")), request.level(), request.bias(), request.csv()}),
       who(request.header())};
-  id.expected_version = *expected;
+  id.expected_version = expected;
   if (!diagnosed)
     return trainer_.retrain(cell, batches, request.level(), request.bias(), Trainer::Quarantine::kStays, id);
   return trainer_.diagnose(cell, batches.empty() ? "" : batches.front(), request.csv(), true, id);

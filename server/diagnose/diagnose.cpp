@@ -105,8 +105,7 @@ std::vector<std::string> sources_of(const Cell& cell, const Placed& placed) {
 
 Result<PreparedBatch> prepare(const Cell& cell, const CheckedBatch& batch,
                               const std::vector<SessionSetting>& sessions) {
-  if (const Status positions = require_positions(batch.rows(), "diagnose"); !positions)
-    return tl::make_unexpected(positions.error());
+  TRY(require_positions(batch.rows(), "diagnose"));
   if (auto doubt = reading_doubt(batch.rows(), cell)) return Failure(std::move(*doubt)).in("batch " + batch.id());
   PreparedBatch prepared;
   // Where rows had to be moved, what begins at a pose is told by its pose id, not by a row.
@@ -177,8 +176,7 @@ std::vector<const CauseRecord*> added_unseen(const std::shared_ptr<const Cell>& 
 
 Result<SearchResult> searched(const std::shared_ptr<const Cell>& cell, const PreparedBatch& prepared,
                               const Placed& placed, const DiagnoseOptions& options, Diagnosis& diagnosis) {
-  const Status wanted = report_progress(options, "calibrating", 0);
-  if (!wanted) return tl::make_unexpected(wanted.error());
+  TRY(report_progress(options, "calibrating", 0));
   std::vector<std::string> sources = sources_of(*cell, placed);
   for (const CauseRecord* cause : added_unseen(cell, sources, prepared.train)) {
     sources.emplace_back(cause->spelling);
@@ -188,8 +186,7 @@ Result<SearchResult> searched(const std::shared_ptr<const Cell>& cell, const Pre
   }
   Result<SearchResult> result = search_causes(cell, sources, prepared.train, options);
   if (!result) return result;
-  const Status go_on = report_progress(options, "measuring the gain", 0.65);
-  if (!go_on) return tl::make_unexpected(go_on.error());
+  TRY(report_progress(options, "measuring the gain", 0.65));
   return result;
 }
 
@@ -245,32 +242,29 @@ void tell_budget(const std::shared_ptr<const Cell>& cell, const MeasurementBatch
 
 Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                             const DiagnoseOptions& options) {
-  const Result<Placed> together = placed(cell, batch, options);
-  if (!together) return tl::make_unexpected(together.error());
-  const Result<PreparedBatch> prepared = prepare(*cell, batch, together->sessions());
-  if (!prepared) return tl::make_unexpected(prepared.error());
+  const Placed together = TRY(placed(cell, batch, options));
+  const PreparedBatch prepared = TRY(prepare(*cell, batch, together.sessions()));
   Diagnosis diagnosis;
-  Result<SearchResult> result = searched(cell, *prepared, *together, options, diagnosis);
-  if (!result) return tl::make_unexpected(result.error());
-  const Explained explained(*cell, std::move(*result));
+  SearchResult result = TRY(searched(cell, prepared, together, options, diagnosis));
+  const Explained explained(*cell, std::move(result));
   const SearchResult& found = explained.found;
   const std::vector<FamilyPtr> families = make_families(explained.after);
 
-  diagnosis.batch = as_recorded(prepared->surrogates, found.batch);
+  diagnosis.batch = as_recorded(prepared.surrogates, found.batch);
   tell_provenance(*cell, batch, options.seed, diagnosis);
-  tell_errors(explained, *prepared, diagnosis);
-  tell_held_out(explained, *prepared, diagnosis);
-  tell_findings(explained, *prepared, diagnosis.batch, remainder_of(explained, *prepared, diagnosis), diagnosis);
+  tell_errors(explained, prepared, diagnosis);
+  tell_held_out(explained, prepared, diagnosis);
+  tell_findings(explained, prepared, diagnosis.batch, remainder_of(explained, prepared, diagnosis), diagnosis);
   tell_since(batch.rows(), diagnosis);
-  tell_noise(explained, *prepared, diagnosis);
+  tell_noise(explained, prepared, diagnosis);
   tell_verdict(diagnosis);
-  tell_row_mistakes(explained, prepared->sorted ? batch.rows() : MeasurementBatch(), diagnosis);
-  tell_sources(found, prepared->sorted, diagnosis);
+  tell_row_mistakes(explained, prepared.sorted ? batch.rows() : MeasurementBatch(), diagnosis);
+  tell_sources(found, prepared.sorted, diagnosis);
   tell_largest_first(diagnosis);
 
   std::vector<Step> steps;
   steps.push_back({"asking what could not have been seen", 0.72, [&] {
-                     tell_blindness(explained, families, *cell, prepared->surrogates, diagnosis.batch, diagnosis);
+                     tell_blindness(explained, families, *cell, prepared.surrogates, diagnosis.batch, diagnosis);
                      tell_periodograms(explained, diagnosis);
                    }});
   steps.push_back({"planning the next poses", 0.8, [&] { tell_next_poses(explained, options, diagnosis); }});
@@ -280,11 +274,11 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
   }
   steps.push_back({"looking at what is left", 0.95, [&] {
                      tell_left_over(explained, options.seed, diagnosis);
-                     tell_limits(explained, *prepared, as_recorded(prepared->surrogates, found.all), diagnosis);
-                     tell_budget(cell, prepared->train, diagnosis);
+                     tell_limits(explained, prepared, as_recorded(prepared.surrogates, found.all), diagnosis);
+                     tell_budget(cell, prepared.train, diagnosis);
                    }});
-  if (const Status done = run(steps, options); !done) return tl::make_unexpected(done.error());
-  tell_sessions(*together, diagnosis);
+  TRY(run(steps, options));
+  tell_sessions(together, diagnosis);
   doubt_changes(batch.rows(), diagnosis);
   diagnosis.sentence = sentence_for(diagnosis) + told_of_sessions(diagnosis) + told_of_jump(cell, batch, diagnosis);
   return diagnosis;

@@ -70,8 +70,7 @@ std::string_view to_string(HealthVerdict verdict) {
 
 Result<HealthCheck> check_health(const CompensatedModel& model, const CheckedBatch& batch,
                                  const HealthOptions& options) {
-  if (const Status positions = require_positions(batch.rows(), "a check"); !positions)
-    return tl::make_unexpected(positions.error());
+  TRY(require_positions(batch.rows(), "a check"));
   if (has_sessions(batch.rows())) {
     return refused("a check is one set-up of the instrument, the batch has {}", batch.rows().sessions.size())
         .in("batch " + batch.id())

@@ -218,9 +218,8 @@ Result<ServedModelPtr> ModelRegistry::from_source(const Key& key, bool in_force)
   if (!source.in_force || !source.version)
     return failure(ErrorCode::kNotFound, "cell {}: version {} is not in memory", key.first, key.second);
   try {
-    auto model = in_force ? source.in_force(key.first) : source.version(key.first, key.second);
-    if (!model) return tl::make_unexpected(model.error());
-    return reclaimed(std::move(*model));
+    auto model = TRY(in_force ? source.in_force(key.first) : source.version(key.first, key.second));
+    return reclaimed(std::move(model));
   } catch (const std::exception& error) {  // out of memory, for one
     return failure(ErrorCode::kInternal, "cell {}: version {} cannot be loaded: {}", key.first, key.second,
                    error.what());

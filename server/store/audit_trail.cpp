@@ -25,10 +25,9 @@ Result<AuditTrail> Store::audit(const AuditQuery& query) const {
   AuditChain chain;
   AuditTrail trail;
   for (bool more = true; more;) {
-    const auto read = connection_->exclusively(
-        [&](Database& database) -> Result<bool> { return read_more(database, query, chain, trail); });
-    if (!read) return tl::make_unexpected(read.error());
-    more = *read;
+    const auto read = TRY(connection_->exclusively(
+        [&](Database& database) -> Result<bool> { return read_more(database, query, chain, trail); }));
+    more = read;
   }
   return trail;
 }

@@ -36,11 +36,11 @@ Status check_size(Database& database, const std::string& path) {
 }
 
 Result<StoreCopy> checked(Database& database, const std::string& path) {
-  if (const Status ours = check_is_store(database, path); !ours) return tl::make_unexpected(ours.error());
+  TRY(check_is_store(database, path));
   const std::string pages = text_of(database, "PRAGMA integrity_check(1)");
   if (pages != "ok") return failure(ErrorCode::kInternal, "damaged: {}", pages).in(path);
-  if (const Status whole = check_size(database, path); !whole) return tl::make_unexpected(whole.error());
-  if (const Status whole = check_texts(database, path); !whole) return tl::make_unexpected(whole.error());
+  TRY(check_size(database, path));
+  TRY(check_texts(database, path));
   StoreCopy copy;
   if (const auto mark = mark_of(database)) copy.identity = mark->identity;
   copy.models = integer_of(database, "SELECT COUNT(*) FROM models");
@@ -78,7 +78,7 @@ Result<StoreCopy> back_up_store(const std::string& from, const std::string& to,
   if (std::error_code error; !fs::exists(from, error))
     return failure(ErrorCode::kNotFound, "no such store").in(from).next("its path stands in the server file as store");
   Result<StoreCopy> copy;
-  const Status made = make_store_file(to, [&](const std::string& part) -> Status {
+  TRY(make_store_file(to, [&](const std::string& part) -> Status {
     try {
       if (const Status copied = copy_pages(from, part, progress); !copied) return copied;
       copy = check_store_copy(part);
@@ -86,8 +86,7 @@ Result<StoreCopy> back_up_store(const std::string& from, const std::string& to,
     } catch (const DatabaseError& error) {
       return failure(ErrorCode::kInternal, "cannot be copied to {}: {}", to, error.what()).in(from);
     }
-  });
-  if (!made) return tl::make_unexpected(made.error());
+  }));
   return copy;
 }
 

@@ -102,24 +102,22 @@ Status Store::set_quarantine(const std::string& cell, const std::string& id, con
   const auto changed = connection_->in_transaction([&](Database& database) -> Result<ChangeOutcome> {
     if (by_job != 0) {
       lock_cell(database, cell);
-      if (const Status held = check_held(database, connection_->worker, by_job, true); !held)
-        return tl::make_unexpected(held.error());
+      TRY(check_held(database, connection_->worker, by_job, true));
     }
     return once(database, cell, change_id, [&]() -> Result<ChangeOutcome> {
-      const auto batch = read_record(database, cell, id);
-      if (!batch) return tl::make_unexpected(batch.error());
-      if (batch->discarded) return discarded_failure(cell, id);
-      if (reason.empty() && batch->quarantine.empty())
+      const auto batch = TRY(read_record(database, cell, id));
+      if (batch.discarded) return discarded_failure(cell, id);
+      if (reason.empty() && batch.quarantine.empty())
         return failure(ErrorCode::kConflict, "batch {} of cell {} is not in quarantine: {}", id, cell,
-                       batch->learned ? "a model was made of it" : "trainings may take it")
+                       batch.learned ? "a model was made of it" : "trainings may take it")
             .of("batch")
             .with_text(id)
             .next("nothing is to be released; trammel retrain trains from it");
-      if (batch->quarantine == reason) return ChangeOutcome{};
+      if (batch.quarantine == reason) return ChangeOutcome{};
       change(database, "UPDATE batches SET quarantine = $1 WHERE cell = $2 AND id = $3", reason, cell, id);
       record_audit(
           database,
-          {cell, reason.empty() ? "release" : "quarantine", "batch " + id, spoken(batch->quarantine), spoken(reason)},
+          {cell, reason.empty() ? "release" : "quarantine", "batch " + id, spoken(batch.quarantine), spoken(reason)},
           change_id);
       return ChangeOutcome{};
     });
@@ -130,13 +128,12 @@ Status Store::set_quarantine(const std::string& cell, const std::string& id, con
 Status Store::discard(const std::string& cell, const std::string& id, const ChangeId& change_id) {
   const auto changed = connection_->in_transaction([&](Database& database) {
     return once(database, cell, change_id, [&]() -> Result<ChangeOutcome> {
-      const auto batch = read_record(database, cell, id);
-      if (!batch) return tl::make_unexpected(batch.error());
-      if (batch->discarded) return ChangeOutcome{};
+      const auto batch = TRY(read_record(database, cell, id));
+      if (batch.discarded) return ChangeOutcome{};
       const std::string now = "discarded" + (change_id.reason.empty() ? "" : ": " + change_id.reason);
       change(database, "UPDATE batches SET quarantine = $1 WHERE cell = $2 AND id = $3", now, cell, id);
       change(database, "INSERT INTO discarded (cell, batch) VALUES ($1, $2)", cell, id);
-      record_audit(database, {cell, "discard", "batch " + id, spoken(batch->quarantine), now}, change_id);
+      record_audit(database, {cell, "discard", "batch " + id, spoken(batch.quarantine), now}, change_id);
       return ChangeOutcome{};
     });
   });

@@ -127,7 +127,7 @@ Result<std::int64_t> Store::descriptions_made() const {
 
 Result<Disputes> Store::agree_on_cells(const Mine& mine, bool starts) {
   if (!is_shared()) return Disputes();
-  const auto differing = connection_->exclusively([&](Database& database) -> Result<Mine> {
+  const auto differing = TRY(connection_->exclusively([&](Database& database) -> Result<Mine> {
     Mine all;
     const auto known = cell_descriptions(database);
     for (const auto& [cell, files] : mine) {
@@ -135,12 +135,11 @@ Result<Disputes> Store::agree_on_cells(const Mine& mine, bool starts) {
       if (found == known.end() || found->second.files != files) all.emplace(cell, files);
     }
     return all;
-  });
-  if (!differing) return tl::make_unexpected(differing.error());
-  if (differing->empty()) return Disputes();
+  }));
+  if (differing.empty()) return Disputes();
   return connection_->in_transaction([&](Database& database) -> Result<Disputes> {
     Comparison comparison(database, connection_->worker, starts);
-    for (const auto& [cell, files] : *differing) comparison.compare(cell, files);
+    for (const auto& [cell, files] : differing) comparison.compare(cell, files);
     return comparison.end();
   });
 }

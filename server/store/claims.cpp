@@ -123,9 +123,7 @@ Result<CancelledJob> Store::cancel_job(std::int64_t job, const JobOutcome& outco
     return ChangeOutcome{0, job};
   };
   return connection_->in_transaction([&](Database& database) -> Result<CancelledJob> {
-    const auto cancelled =
-        once(database, cell_of_job(database, job), by, [&]() -> Result<ChangeOutcome> { return cancel(database); });
-    if (!cancelled) return tl::make_unexpected(cancelled.error());
+    TRY(once(database, cell_of_job(database, job), by, [&]() -> Result<ChangeOutcome> { return cancel(database); }));
     const bool runs = exists(database, "SELECT 1 FROM jobs WHERE id = $1 AND state = 'running'", job);
     return runs ? CancelledJob::kAsked : CancelledJob::kEnded;
   });

@@ -48,16 +48,13 @@ void FileConnection::note_opened() {
 }
 
 Result<std::unique_ptr<StoreConnection>> FileConnection::open(const std::string& path) {
-  auto lock = WriterLock::take(path);
-  if (!lock) return tl::make_unexpected(lock.error());
+  auto lock = TRY(WriterLock::take(path));
   auto copies = std::make_unique<ServedCopies>(path + ".models");
   StoreFile file(path);
-  if (auto held = file.hold(); !held) return tl::make_unexpected(held.error());
-  auto opened = open_database(path, *copies);
-  if (!opened) return tl::make_unexpected(opened.error());
+  TRY(file.hold());
+  auto opened = TRY(open_database(path, *copies));
   if (auto held = file.hold(); !held) return tl::make_unexpected(held.error());  // where it was not there before
-  return std::make_unique<FileConnection>(std::move(*lock), std::move(file), path, std::move(*opened),
-                                          std::move(copies));
+  return std::make_unique<FileConnection>(std::move(lock), std::move(file), path, std::move(opened), std::move(copies));
 }
 
 Status FileConnection::read(const Job& job) {
@@ -146,10 +143,9 @@ Status FileConnection::open_anew() {
 Status FileConnection::opened_anew() {
   database_.reset();  // one connection at a time: its locks are the process's
   if (auto held = file_.hold(); !held) return held;
-  auto opened = open_database(path, *copies);
-  if (!opened) return tl::make_unexpected(opened.error());
-  database_ = std::move(opened->file);
-  if (opened->why_not_written) return tl::make_unexpected(*opened->why_not_written);
+  auto opened = TRY(open_database(path, *copies));
+  database_ = std::move(opened.file);
+  if (opened.why_not_written) return tl::make_unexpected(*opened.why_not_written);
   if (auto held = file_.hold(); !held) return held;
   note_opened();
   must_be_opened_anew_ = false;

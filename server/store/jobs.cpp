@@ -227,7 +227,7 @@ const char* asked_for(JobKind kind) {
 template <typename Insert>
 Result<StoredJob> queue_once(Database& database, const StoredJob& job, const ChangeId& change_id,
                              const Insert& insert) {
-  const auto queued = once(database, job.cell, change_id, [&] {
+  const auto queued = TRY(once(database, job.cell, change_id, [&] {
     return insert().map([&](const StoredJob& made) {
       record_audit(database,
                    {made.cell, asked_for(made.kind), fmt::format("job {}", made.id), "",
@@ -236,9 +236,8 @@ Result<StoredJob> queue_once(Database& database, const StoredJob& job, const Cha
                    change_id);
       return ChangeOutcome{0, made.id};
     });
-  });
-  if (!queued) return tl::make_unexpected(queued.error());
-  return read_job(database, queued->job);
+  }));
+  return read_job(database, queued.job);
 }
 
 }  // namespace
@@ -393,8 +392,7 @@ Status Store::set_job_queued(std::int64_t id, bool attempt_counts) {
 Status Store::set_job_failed(std::int64_t id, const std::string& message, const JobOutcome& outcome,
                              const ChangeId& by) {
   const auto fail = [&](Database& database) -> Result<ChangeOutcome> {
-    if (const Status held = check_held(database, connection_->worker, id); !held)
-      return tl::make_unexpected(held.error());
+    TRY(check_held(database, connection_->worker, id));
     return changed_one(fail_job(database, id, message, outcome, by) ? 1 : 0, id).map([&] {
       return ChangeOutcome{0, id};
     });

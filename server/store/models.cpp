@@ -161,9 +161,8 @@ Result<int> version_of(const Result<ChangeOutcome>& outcome) {
 }
 
 Result<CompensatedModel> model_in(const ServedCopies::Copy& copy) {
-  const auto text = read_text_file(copy.file);
-  if (!text) return tl::make_unexpected(text.error());
-  return deserialize(*text, copy.file, ModelTexts::kAsTheyAre);
+  const auto text = TRY(read_text_file(copy.file));
+  return deserialize(text, copy.file, ModelTexts::kAsTheyAre);
 }
 
 }  // namespace
@@ -173,9 +172,8 @@ Result<int> Store::add_model(const std::string& cell, const CompensatedModel& mo
                              const JobOutcome& outcome) {
   const std::string content = serialize(model);
   const auto insert = [&](Database& database) -> Result<ChangeOutcome> {
-    const auto next = next_version(database, cell);
-    if (!next) return tl::make_unexpected(next.error());
-    const int version = *next;
+    const auto next = TRY(next_version(database, cell));
+    const int version = next;
     insert_model(database, cell, version, model, content);
     record_audit(
         database,
@@ -183,8 +181,7 @@ Result<int> Store::add_model(const std::string& cell, const CompensatedModel& mo
          fmt::format("sha256 {}{}", model.provenance().hash, job == 0 ? "" : fmt::format(", of job {}", job)), message},
         change_id);
     if (job != 0) {
-      if (auto ended = end_job(database, connection_->worker, job, cell, version, message, outcome); !ended)
-        return tl::make_unexpected(ended.error());
+      TRY(end_job(database, connection_->worker, job, cell, version, message, outcome));
     }
     if (put_in_force || release) release_batches_of(database, cell, version, change_id);
     if (put_in_force) activate_on_top(database, cell, version, "put in force", message, change_id);
@@ -250,14 +247,13 @@ Result<std::vector<int>> Store::previous_in_force(const std::string& cell) const
 
 Result<int> Store::rollback(const std::string& cell, int steps, const ChangeId& change_id) {
   const auto go_back = [&](Database& database) -> Result<ChangeOutcome> {
-    const auto before = activations_before(database, cell);
-    if (!before) return tl::make_unexpected(before.error());
-    if (steps < 1 || static_cast<std::size_t>(steps) > before->size()) {
-      return failure(ErrorCode::kNotFound, "cell {}: {} versions to go back to, not {}", cell, before->size(), steps)
+    const auto before = TRY(activations_before(database, cell));
+    if (steps < 1 || static_cast<std::size_t>(steps) > before.size()) {
+      return failure(ErrorCode::kNotFound, "cell {}: {} versions to go back to, not {}", cell, before.size(), steps)
           .of("steps")
-          .beyond(steps, steps < 1 ? 1 : before->size());
+          .beyond(steps, steps < 1 ? 1 : before.size());
     }
-    const Activation& wanted = (*before)[static_cast<std::size_t>(steps - 1)];
+    const Activation& wanted = before[static_cast<std::size_t>(steps - 1)];
     const auto present = present_activation(database, cell);
     insert_activation(database, cell, wanted.version, wanted.back);
     record_audit(database, {cell, "rollback", "in force", spoken(present), fmt::format("version {}", wanted.version)},
@@ -325,9 +321,8 @@ Result<ReadModel> Store::read(const std::string& cell, int version) const {
 }
 
 Result<CompensatedModel> Store::model(const std::string& cell, int version) const {
-  auto read_one = read(cell, version);
-  if (!read_one) return tl::make_unexpected(read_one.error());
-  return std::move(read_one->model);
+  auto read_one = TRY(read(cell, version));
+  return std::move(read_one.model);
 }
 
 Result<std::optional<int>> Store::version_in_force(const std::string& cell) const {
@@ -364,7 +359,7 @@ Status Store::copy_model_in_force(const std::string& cell) const {
     std::string content;
   };
   const auto copies = connection_->copies->of(cell);
-  const auto present = connection_->exclusively([&](Database& database) -> Result<std::optional<Present>> {
+  const auto present = TRY(connection_->exclusively([&](Database& database) -> Result<std::optional<Present>> {
     const auto now = present_activation(database, cell);
     const std::int64_t copied = copies.empty() ? 0 : copies.front().activation;
     const bool is_copied = now && (connection_->is_shared() ? copied == now->number : copied >= now->number);
@@ -372,12 +367,11 @@ Status Store::copy_model_in_force(const std::string& cell) const {
     auto row = prepare(database, "SELECT content FROM models WHERE cell = $1 AND version = $2", cell, now->version);
     if (!row.next()) return std::nullopt;
     return Present{*now, row.text(0)};
-  });
-  if (!present) return tl::make_unexpected(present.error());
-  if (!*present) return {};
-  const Activation& now = (*present)->activation;
+  }));
+  if (!present) return {};
+  const Activation& now = present->activation;
   if (connection_->is_shared()) connection_->copies->forget_after(cell, now.number);
-  return connection_->copies->keep(cell, now.number, now.version, (*present)->content);
+  return connection_->copies->keep(cell, now.number, now.version, present->content);
 }
 
 std::vector<int> Store::versions_to_serve(const std::string& cell) const {
@@ -406,20 +400,18 @@ Status Store::take_back_from_copy(const std::string& cell) {
   const auto copies = connection_->copies->of(cell);
   if (connection_->is_shared() || copies.empty() || connection_->state().why_not_written) return {};
   const ServedCopies::Copy& newest = copies.front();
-  const auto lost = connection_->exclusively([&](Database& database) -> Result<bool> {
+  const auto lost = TRY(connection_->exclusively([&](Database& database) -> Result<bool> {
     const auto present = present_activation(database, cell);
     return !present || present->number < newest.activation;
-  });
-  if (!lost) return tl::make_unexpected(lost.error());
-  if (!*lost) return {};
-  const auto model = model_in(newest);
-  if (!model) return tl::make_unexpected(model.error());
+  }));
+  if (!lost) return {};
+  const auto model = TRY(model_in(newest));
   const Status taken = connection_->in_transaction([&](Database& database) -> Status {
     auto there = prepare(database, "SELECT hash FROM models WHERE cell = $1 AND version = $2", cell, newest.version);
     if (!there.next()) {
       count_version(database, cell, newest.version);
-      insert_model(database, cell, newest.version, *model, serialize(*model));
-    } else if (there.text(0) != model->provenance().hash) {
+      insert_model(database, cell, newest.version, model, serialize(model));
+    } else if (there.text(0) != model.provenance().hash) {
       return failure(ErrorCode::kConflict, "cell {}: version {} is another one than was in force", cell, newest.version)
           .in(newest.file);
     }

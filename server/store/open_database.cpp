@@ -52,16 +52,15 @@ Status check_there(const std::string& path, const ServedCopies& copies) {
 /// Gives the copies the store's id. Refuses a store that is not the one whose models were served here.
 Status check_identity(Database& database, const std::string& path, ServedCopies& copies) {
   const auto known = copies.stores();
-  const auto id = identity_of(database, known.size() == 1 ? known.front() : "");
-  if (!id) return tl::make_unexpected(id.error());
-  const bool is_known = std::find(known.begin(), known.end(), *id) != known.end();
+  const auto id = TRY(identity_of(database, known.size() == 1 ? known.front() : ""));
+  const bool is_known = std::find(known.begin(), known.end(), id) != known.end();
   if (!known.empty() && !is_known && has_models(database)) {
     return failure(ErrorCode::kInternal, "another store than the one that served here, whose copies are in {}",
                    copies.root())
         .in(path)
         .next("put the right one back, or move the copies away if it is meant to be another");
   }
-  static_cast<void>(copies.belong_to(*id, true));  // without the folder there are no copies: the store goes on
+  static_cast<void>(copies.belong_to(id, true));  // without the folder there are no copies: the store goes on
   return {};
 }
 

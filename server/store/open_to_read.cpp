@@ -19,7 +19,7 @@ Result<std::unique_ptr<Database>> open_url(const std::string& url, Session sessi
   const std::string place = spoken_place(url);
   auto database = PostgresDatabase::connect(url, session);
   if (!database) return Failure(database.error()).in(place);
-  if (const Status ours = check_shared_schema(**database, place); !ours) return tl::make_unexpected(ours.error());
+  TRY(check_shared_schema(**database, place));
   return std::unique_ptr<Database>(std::move(*database));
 }
 

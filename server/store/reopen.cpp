@@ -30,9 +30,8 @@ Status reopen_store(const std::string& place) {
   const std::string said = spoken_place(place);
   std::optional<WriterLock> nobody_writes;
   if (!is_postgres_url(place)) {
-    auto lock = WriterLock::take(place);
-    if (!lock) return tl::make_unexpected(lock.error());
-    nobody_writes.emplace(std::move(*lock));
+    auto lock = TRY(WriterLock::take(place));
+    nobody_writes.emplace(std::move(lock));
   }
   try {
     const auto database = open_to_write(place);

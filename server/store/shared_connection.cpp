@@ -34,7 +34,7 @@ Result<std::unique_ptr<StoreConnection>> SharedConnection::open(const std::strin
   auto connected = PostgresDatabase::connect(url, PostgresDatabase::Session::kWrites);
   const auto stores = made->copies->stores();
   if (connected) {
-    if (const Status ours = made->admit(**connected); !ours) return tl::make_unexpected(ours.error());
+    TRY(made->admit(**connected));
     made->give_back(std::move(*connected));
   } else {
     Failure why = Failure(connected.error()).in(made->path);
@@ -72,7 +72,7 @@ Status SharedConnection::admit(Database& database) {
 Result<SharedConnection::Connected> SharedConnection::connect() {
   auto connected = PostgresDatabase::connect(url_, PostgresDatabase::Session::kWrites);
   if (!connected) return Failure(connected.error()).in(path);
-  if (const Status ours = admit(**connected); !ours) return tl::make_unexpected(ours.error());
+  TRY(admit(**connected));
   return connected;
 }
 

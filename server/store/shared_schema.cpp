@@ -94,43 +94,40 @@ void grant(Database& database, const std::string& role) {
 }  // namespace
 
 Status check_shared_schema(Database& database, const std::string& place) {
-  const auto schema = schema_of(database, place);
-  if (!schema) return tl::make_unexpected(schema.error());
+  const auto schema = TRY(schema_of(database, place));
   const std::string init = fmt::format("run trammel store init '{}' as the role that is to own it", place);
-  if (schema->version == 0) return refused("the database is empty").in(place).of(kSchemaField).next(init);
-  if (schema->version >= newest()) return {};
-  return refused("schema {} is older than this program's, {}", schema->version, newest())
+  if (schema.version == 0) return refused("the database is empty").in(place).of(kSchemaField).next(init);
+  if (schema.version >= newest()) return {};
+  return refused("schema {} is older than this program's, {}", schema.version, newest())
       .in(place)
       .of(kSchemaField)
-      .beyond(schema->version, newest())
+      .beyond(schema.version, newest())
       .next(init);
 }
 
 Status check_all_is_known(Database& database, const std::string& place) {
-  const auto schema = schema_of(database, place);
-  if (!schema) return tl::make_unexpected(schema.error());
-  if (schema->version <= newest()) return {};
-  return too_new(schema->version, place);
+  const auto schema = TRY(schema_of(database, place));
+  if (schema.version <= newest()) return {};
+  return too_new(schema.version, place);
 }
 
 Status migrate_shared_schema(Database& database, const std::string& place) {
   Transaction transaction(database, Transaction::For::kWriting);
   constexpr std::int64_t kOneAtATime = 0x5452414D;  // "TRAM"
   static_cast<void>(prepare(database, "SELECT pg_advisory_xact_lock($1)", kOneAtATime));
-  const auto schema = schema_of(database, place);
-  if (!schema) return tl::make_unexpected(schema.error());
-  for (std::int64_t version = schema->version; version < newest(); ++version) {
+  const auto schema = TRY(schema_of(database, place));
+  for (std::int64_t version = schema.version; version < newest(); ++version) {
     const Migration& step = migrations()[static_cast<std::size_t>(version)];
     database.execute(step.statements);
     change(database, "UPDATE trammel_schema SET version = $1, works_from = $2", version + 1, step.works_from);
   }
   // New tables are for those who had the others.
-  if (schema->version > 0 && schema->version < newest()) {
+  if (schema.version > 0 && schema.version < newest()) {
     for (const std::string& role : roles_let_in(database)) grant(database, role);
   }
-  if (schema->version < newest())
-    record_audit(database, {"", schema->version == 0 ? "store" : "migrate", "store",
-                            schema->version == 0 ? "" : fmt::format("schema {}", schema->version),
+  if (schema.version < newest())
+    record_audit(database, {"", schema.version == 0 ? "store" : "migrate", "store",
+                            schema.version == 0 ? "" : fmt::format("schema {}", schema.version),
                             fmt::format("schema {}", newest())});
   transaction.commit();
   return {};

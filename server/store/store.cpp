@@ -17,9 +17,8 @@ Store::Store(std::unique_ptr<StoreConnection> connection) : connection_(std::mov
 Store::~Store() = default;
 
 Result<std::unique_ptr<Store>> Store::open(const std::string& place, const std::string& cache) {
-  auto connection = is_postgres_url(place) ? SharedConnection::open(place, cache) : FileConnection::open(place);
-  if (!connection) return tl::make_unexpected(connection.error());
-  return std::unique_ptr<Store>(new Store(std::move(*connection)));
+  auto connection = TRY(is_postgres_url(place) ? SharedConnection::open(place, cache) : FileConnection::open(place));
+  return std::unique_ptr<Store>(new Store(std::move(connection)));
 }
 
 StoreState Store::state() const { return connection_->state(); }

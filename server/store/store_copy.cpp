@@ -45,8 +45,8 @@ Status check_pages(Database& database, const std::string& place) {
 }
 
 Result<StoreContent> content_of(Database& database, const std::string& place) {
-  if (const Status whole = check_pages(database, place); !whole) return tl::make_unexpected(whole.error());
-  if (const Status whole = check_texts(database, place); !whole) return tl::make_unexpected(whole.error());
+  TRY(check_pages(database, place));
+  TRY(check_texts(database, place));
   const auto trail = check_trail(database);
   if (!trail) return Failure(trail.error()).in(place);
   StoreContent content{text_of(database, "SELECT id FROM store_identity WHERE id <> ''"), {}, trail->rows, trail->hash};
@@ -88,7 +88,7 @@ Result<StoreContent> fill(Database& source, const std::string& from, Database& t
                           const Progress& progress) {
   Transaction transaction(target, Transaction::For::kWriting);
   target.take_long();
-  if (const Status room = make_room(target, to); !room) return tl::make_unexpected(room.error());
+  TRY(make_room(target, to));
   std::int64_t total = 1, done = 0;
   for (const StoreTable& table : store_tables()) total += rows_of(source, table.name);
   for (const StoreTable& table : store_tables()) {
@@ -115,7 +115,7 @@ Result<StoreContent> fill(Database& source, const std::string& from, Database& t
 Result<StoreContent> copy_to_file(Database& source, const std::string& from, const std::string& to,
                                   const Progress& progress) {
   Result<StoreContent> content;
-  const Status made = make_store_file(to, [&](const std::string& part) -> Status {
+  TRY(make_store_file(to, [&](const std::string& part) -> Status {
     {
       SqliteDatabase target(part, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout);
       if (const Status ready = prepare_file(target, part); !ready) return ready;
@@ -124,8 +124,7 @@ Result<StoreContent> copy_to_file(Database& source, const std::string& from, con
       content = fill(source, from, target, to, progress);
     }
     return content.map([](const StoreContent&) {});
-  });
-  if (!made) return tl::make_unexpected(made.error());
+  }));
   return content;
 }
 
@@ -134,14 +133,13 @@ Result<StoreContent> copy_to_database(Database& source, const std::string& from,
   const std::string to = spoken_place(url);
   const auto target = PostgresDatabase::connect(url, PostgresDatabase::Session::kWrites);
   if (!target) return Failure(target.error()).in(to);
-  if (const Status ready = migrate_shared_schema(**target, to); !ready) return tl::make_unexpected(ready.error());
+  TRY(migrate_shared_schema(**target, to));
   return fill(source, from, **target, to, progress);
 }
 
 Result<StoreContent> copy_to(Database& source, const std::string& from, const std::string& to,
                              const Progress& progress) {
-  const Status known = source.is_shared() ? check_all_is_known(source, from) : Status();
-  if (!known) return tl::make_unexpected(known.error());
+  TRY(source.is_shared() ? check_all_is_known(source, from) : Status());
   return is_postgres_url(to) ? copy_to_database(source, from, to, progress) : copy_to_file(source, from, to, progress);
 }
 
@@ -165,16 +163,15 @@ void mark_as_moved(Database& source, Transaction& moment, const std::string& fro
 
 Result<StoreContent> move_store(const std::string& from, const std::string& to, const Progress& progress) {
   const std::string said = spoken_place(from);
-  const auto source = is_postgres_url(from) ? open_to_write(from) : open_to_read(from);
-  if (!source) return tl::make_unexpected(source.error());
-  Transaction moment(**source, (*source)->is_shared() ? Transaction::For::kWriting : Transaction::For::kReading);
-  keep_as_it_is(**source);
-  (*source)->take_long();
-  if (const Status here = check_not_moved(**source, said); !here) return tl::make_unexpected(here.error());
-  auto content = copy_to(**source, said, to, progress);
+  const auto source = TRY(is_postgres_url(from) ? open_to_write(from) : open_to_read(from));
+  Transaction moment(*source, source->is_shared() ? Transaction::For::kWriting : Transaction::For::kReading);
+  keep_as_it_is(*source);
+  source->take_long();
+  TRY(check_not_moved(*source, said));
+  auto content = copy_to(*source, said, to, progress);
   if (!content) return content;
   try {
-    mark_as_moved(**source, moment, from, to);
+    mark_as_moved(*source, moment, from, to);
   } catch (const DatabaseError& error) {
     return failure(ErrorCode::kInternal, "{} is whole, but this one could not be marked as moved there: {}",
                    spoken_place(to), error.what())
@@ -185,11 +182,10 @@ Result<StoreContent> move_store(const std::string& from, const std::string& to, 
 }
 
 Result<StoreContent> copy_and_keep(const std::string& from, const std::string& to, const Progress& progress) {
-  const auto source = open_to_read(from);
-  if (!source) return tl::make_unexpected(source.error());
-  const Transaction moment(**source, Transaction::For::kReading);
-  (*source)->take_long();
-  return copy_to(**source, spoken_place(from), to, progress);
+  const auto source = TRY(open_to_read(from));
+  const Transaction moment(*source, Transaction::For::kReading);
+  source->take_long();
+  return copy_to(*source, spoken_place(from), to, progress);
 }
 
 }  // namespace
@@ -205,9 +201,8 @@ Result<StoreContent> copy_store(const std::string& from, const std::string& to, 
                                 const Progress& progress) {
   std::optional<WriterLock> nobody_writes;
   if (!is_postgres_url(from)) {
-    auto lock = WriterLock::take(from);
-    if (!lock) return tl::make_unexpected(lock.error());
-    nobody_writes.emplace(std::move(*lock));
+    auto lock = TRY(WriterLock::take(from));
+    nobody_writes.emplace(std::move(lock));
   }
   try {
     return source == SourceAfter::kMoved ? move_store(from, to, progress) : copy_and_keep(from, to, progress);

@@ -22,7 +22,7 @@ std::invoke_result_t<const Work&, Database&> in_record(const std::string& url, T
   const auto database = PostgresDatabase::connect(url, PostgresDatabase::Session::kWrites);
   if (!database) return Failure(database.error()).in(place);
   try {
-    if (const Status ours = check_shared_schema(**database, place); !ours) return tl::make_unexpected(ours.error());
+    TRY(check_shared_schema(**database, place));
     Transaction transaction(**database, what);
     auto done = work(**database);
     if (done) transaction.commit();

@@ -154,11 +154,10 @@ void Trainer::keep_claim() {
 Status Trainer::cancel_in_record(const StoredJob& job, const ChangeId& by) {
   const JobOutcome outcome = cancelled_outcome(by.who);
   // Before it is told here: whoever takes the job up if this server dies now ends it, too.
-  const auto cancelled = store_.cancel_job(job.id, outcome, by);
-  if (!cancelled) return tl::make_unexpected(cancelled.error());
-  if (*cancelled == CancelledJob::kEnded || runner_.claimed() == job.id)
+  const auto cancelled = TRY(store_.cancel_job(job.id, outcome, by));
+  if (cancelled == CancelledJob::kEnded || runner_.claimed() == job.id)
     static_cast<void>(queue_.cancel(job.id, by.who));
-  if (*cancelled == CancelledJob::kAsked) return {};
+  if (cancelled == CancelledJob::kAsked) return {};
   JobProgress progress = progress_of(job);
   progress.stage = JobStage::kFailed;
   progress.what = outcome.why;

@@ -11,7 +11,7 @@ using State = CellAtStart::State;
 Result<CellAtStart> look_at(const ServedModels& models, const std::string& name, const Cell& cell) {
   CellAtStart one{name, State::kDark};
   bool fits_not = false;
-  const auto served = models.find(name, [&](const ModelOnDisk& on_disk) {
+  TRY(models.find(name, [&](const ModelOnDisk& on_disk) {
     const std::string where = fmt::format("version {} of cell {}", on_disk.version, name);
     const auto read = read_model(on_disk, where);
     Status good = read ? check_fits_cell(read->model, cell, where) : Status(tl::make_unexpected(read.error()));
@@ -26,13 +26,11 @@ Result<CellAtStart> look_at(const ServedModels& models, const std::string& name,
       one.why = sentence(good.error());
     }
     return good || fits_not;  // of a model that does not fit, no other version takes the place
-  });
-  if (!served) return tl::make_unexpected(served.error());
+  }));
   if (one.version == 0) {
-    const auto has = models.has(name);
-    if (!has) return tl::make_unexpected(has.error());
-    if (*has) one.why = fmt::format("the versions of cell {} that were in force are not there", name);
-    if (!*has) one.state = State::kUntrained;
+    const auto has = TRY(models.has(name));
+    if (has) one.why = fmt::format("the versions of cell {} that were in force are not there", name);
+    if (!has) one.state = State::kUntrained;
   }
   return one;
 }
@@ -40,13 +38,11 @@ Result<CellAtStart> look_at(const ServedModels& models, const std::string& name,
 }  // namespace
 
 Result<std::vector<CellAtStart>> cells_at_start(const std::string& path, const ServedCells& cells) {
-  const auto models = ServedModels::open(path);
-  if (!models) return tl::make_unexpected(models.error());
+  const auto models = TRY(ServedModels::open(path));
   std::vector<CellAtStart> all;
   for (const auto& [name, cell] : cells) {
-    auto one = look_at(*models, name, *cell);
-    if (!one) return tl::make_unexpected(one.error());
-    all.push_back(std::move(*one));
+    auto one = TRY(look_at(models, name, *cell));
+    all.push_back(std::move(one));
   }
   return all;
 }

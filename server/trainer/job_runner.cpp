@@ -64,10 +64,9 @@ bool pause(std::chrono::milliseconds length, const std::stop_token& stop) {
 
 /// What the checks of the cell that are done saw of its arm's drift, oldest first.
 Result<std::vector<std::string>> earlier_checks(const Store& store, const std::string& cell) {
-  const auto jobs = store.recent_jobs(cell, kMostEarlierJobs);
-  if (!jobs) return tl::make_unexpected(jobs.error());
+  const auto jobs = TRY(store.recent_jobs(cell, kMostEarlierJobs));
   std::vector<std::string> earlier;
-  for (const StoredJob& job : *jobs) {
+  for (const StoredJob& job : jobs) {
     if (job.kind != JobKind::kCheck || job.state != JobState::kDone) continue;
     const auto found = store.diagnosis(job.id);
     const auto drift = found ? drift_of(found->findings) : std::nullopt;
@@ -163,23 +162,19 @@ Result<ComputeTask> JobRunner::task_of(const StoredJob& job, const std::optional
   task.level = job.level;
   task.bias = job.bias;
   task.apply = asked && asked->apply;
-  const auto came = came_with_batch(job);
-  if (!came) return tl::make_unexpected(came.error());
-  task.hold_against_in_force = *came;
-  const auto alone = learns_alone(job, *came);
-  if (!alone) return tl::make_unexpected(alone.error());
-  if (!*alone) {
-    auto earlier = earlier_sessions(store_, job, task.cell->sessions, options_.max_poses);
-    if (!earlier) return tl::make_unexpected(earlier.error());
-    task.earlier_ids = std::move(*earlier);
+  const auto came = TRY(came_with_batch(job));
+  task.hold_against_in_force = came;
+  const auto alone = TRY(learns_alone(job, came));
+  if (!alone) {
+    auto earlier = TRY(earlier_sessions(store_, job, task.cell->sessions, options_.max_poses));
+    task.earlier_ids = std::move(earlier);
   }
   if (const auto present = registry_.in_force(job.cell))
     task.in_force = ModelText{present->version, serialize(present->model)};
   task.fleet = fleet_prior_of(job);
   if (job.kind == JobKind::kCheck) {
-    auto earlier = earlier_checks(store_, job.cell);
-    if (!earlier) return tl::make_unexpected(earlier.error());
-    task.earlier_checks = std::move(*earlier);
+    auto earlier = TRY(earlier_checks(store_, job.cell));
+    task.earlier_checks = std::move(earlier);
   }
   task.seed = options_.seed;
   task.validation_share = options_.validation_share;
@@ -221,13 +216,10 @@ Result<bool> JobRunner::came_with_batch(const StoredJob& job) const {
 
 Status JobRunner::give_batches(Computing& computing, const StoredJob& job, const std::optional<StoredDiagnosis>& asked,
                                const std::vector<std::string>& earlier) const {
-  const auto sources = batch_sources(store_, job, !asked || asked->apply, earlier);
-  if (!sources) return tl::make_unexpected(sources.error());
-  for (const BatchSource& source : *sources) {
-    const auto stored = store_.batch(job.cell, source.id);
-    if (!stored) return tl::make_unexpected(stored.error());
-    if (Status taken = computing.take({source.id, stored->csv, stored->accepted_at}, source.judges); !taken)
-      return taken;
+  const auto sources = TRY(batch_sources(store_, job, !asked || asked->apply, earlier));
+  for (const BatchSource& source : sources) {
+    const auto stored = TRY(store_.batch(job.cell, source.id));
+    if (Status taken = computing.take({source.id, stored.csv, stored.accepted_at}, source.judges); !taken) return taken;
   }
   if (asked && job.batch_ids.empty()) return computing.take({"", asked->csv, job.created_at}, false);
   return {};

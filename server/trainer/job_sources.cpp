@@ -13,10 +13,9 @@ constexpr std::int64_t kSecondsPerDay = 86400;
 Status check_own(const Store& store, const StoredJob& job, const std::set<std::string>& own,
                  const std::vector<StoredBatch>& stored) {
   if (job.kind != JobKind::kTrain) return {};
-  const auto may_release = store.may_release(job.id);
-  if (!may_release) return tl::make_unexpected(may_release.error());
+  const auto may_release = TRY(store.may_release(job.id));
   for (const StoredBatch& batch : stored) {
-    if (!own.contains(batch.id) || *may_release) continue;
+    if (!own.contains(batch.id) || may_release) continue;
     if (Status free = check_released(batch); !free) return free;
   }
   return {};
@@ -35,19 +34,17 @@ Status check_released(const StoredBatch& batch) {
 Result<std::vector<std::string>> earlier_sessions(const Store& store, const StoredJob& job, const SessionRule& rule,
                                                   int max_poses) {
   const std::set<std::string> own(job.batch_ids.begin(), job.batch_ids.end());
-  const auto stored = store.batches(job.cell);
-  if (!stored) return tl::make_unexpected(stored.error());
-  const auto learned = store.batches_learned_from(job.cell);
-  if (!learned) return tl::make_unexpected(learned.error());
+  const auto stored = TRY(store.batches(job.cell));
+  const auto learned = TRY(store.batches_learned_from(job.cell));
   std::int64_t newest = 0, poses = 0;
-  for (const StoredBatch& batch : *stored) {
+  for (const StoredBatch& batch : stored) {
     if (!own.contains(batch.id)) continue;
     newest = std::max(newest, batch.accepted_at);
     poses += batch.poses;
   }
   std::vector<std::string> earlier;
-  for (auto batch = stored->rbegin(); batch != stored->rend(); ++batch) {
-    if (own.contains(batch->id) || !batch->quarantine.empty() || batch->pruned || !learned->contains(batch->id))
+  for (auto batch = stored.rbegin(); batch != stored.rend(); ++batch) {
+    if (own.contains(batch->id) || !batch->quarantine.empty() || batch->pruned || !learned.contains(batch->id))
       continue;
     const bool too_old =
         rule.kind == SessionRule::Kind::kDays && batch->accepted_at < newest - kSecondsPerDay * rule.count;
@@ -65,16 +62,14 @@ Result<std::vector<std::string>> earlier_sessions(const Store& store, const Stor
 Result<std::vector<BatchSource>> batch_sources(const Store& store, const StoredJob& job, bool judged,
                                                const std::vector<std::string>& earlier) {
   const std::set<std::string> own(job.batch_ids.begin(), job.batch_ids.end());
-  const auto stored = store.batches(job.cell);
-  if (!stored) return tl::make_unexpected(stored.error());
-  if (const Status free = check_own(store, job, own, *stored); !free) return tl::make_unexpected(free.error());
+  const auto stored = TRY(store.batches(job.cell));
+  TRY(check_own(store, job, own, stored));
   std::vector<BatchSource> judging;
   if (judged) {
-    const auto may_judge = store.batches_learned_from(job.cell);
-    if (!may_judge) return tl::make_unexpected(may_judge.error());
-    for (auto batch = stored->rbegin(); batch != stored->rend() && judging.size() < kMostSessions; ++batch) {
+    const auto may_judge = TRY(store.batches_learned_from(job.cell));
+    for (auto batch = stored.rbegin(); batch != stored.rend() && judging.size() < kMostSessions; ++batch) {
       if (batch->pruned) continue;
-      if (!own.contains(batch->id) && (!batch->quarantine.empty() || !may_judge->contains(batch->id))) continue;
+      if (!own.contains(batch->id) && (!batch->quarantine.empty() || !may_judge.contains(batch->id))) continue;
       judging.push_back({batch->id, true});
     }
     std::reverse(judging.begin(), judging.end());

@@ -47,11 +47,10 @@ Status check_most(const char* field, std::size_t asked, std::size_t most, const 
 Status check_spellings(const Cell& cell, const std::string& level, const std::string& bias) {
   if (!level.empty()) {
     if (Status fits = check_most("level", level.size(), kMostSpellingBytes, "bytes"); !fits) return fits;
-    const auto specs = parse_level(level);
-    if (!specs) return tl::make_unexpected(specs.error());
-    if (Status fits = check_most("level", specs->size(), kMaxSources, "error sources"); !fits) return fits;
-    for (const std::string& spec : spelled_out(*specs, cell)) {
-      if (auto source = make_error_source(spec, cell); !source) return tl::make_unexpected(source.error());
+    const auto specs = TRY(parse_level(level));
+    if (Status fits = check_most("level", specs.size(), kMaxSources, "error sources"); !fits) return fits;
+    for (const std::string& spec : spelled_out(specs, cell)) {
+      TRY(make_error_source(spec, cell));
     }
   }
   return bias.empty() ? Status() : check_bias_spelling(bias);
@@ -123,7 +122,7 @@ Result<bool> Trainer::can_take_up(const StoredJob& job, std::vector<std::string>
   if (store_.is_shared() && !store_.set_job_running(job.id)) return false;  // another server works on it
   const std::string why = fmt::format("its training was interrupted by a crash {} times", job.attempts);
   const JobOutcome outcome = failed_outcome(failure(ErrorCode::kInternal, "{}", why).value(), JobVerdict::kBroken);
-  if (auto failed = store_.set_job_failed(job.id, why, outcome); !failed) return tl::make_unexpected(failed.error());
+  TRY(store_.set_job_failed(job.id, why, outcome));
   notices.push_back(fmt::format("job {} of cell {} has failed: {}", job.id, job.cell, why));
   return false;
 }
@@ -288,13 +287,11 @@ Result<std::int64_t> Trainer::submit(const std::string& cell_name, const std::st
 }
 
 Result<std::int64_t> Trainer::take_in(StoredBatch batch) {
-  const auto cell = cells_.find(batch.cell);
-  if (!cell) return tl::make_unexpected(cell.error());
-  if (auto valid = check_batch_id(batch.id); !valid) return tl::make_unexpected(valid.error());
-  const auto received = received_batch({batch.id, batch.csv, batch.accepted_at}, **cell,
-                                       held_out_by_service(options_.validation_share, options_.seed));
-  if (!received) return tl::make_unexpected(received.error());
-  batch.poses = static_cast<int>(received->size());
+  const auto cell = TRY(cells_.find(batch.cell));
+  TRY(check_batch_id(batch.id));
+  const auto received = TRY(received_batch({batch.id, batch.csv, batch.accepted_at}, *cell,
+                                           held_out_by_service(options_.validation_share, options_.seed)));
+  batch.poses = static_cast<int>(received.size());
   if (batch.poses > options_.max_poses) {
     return failure(ErrorCode::kTooLarge, "batch {} has {} poses, limit {}", batch.id, batch.poses, options_.max_poses)
         .of("poses")
@@ -308,10 +305,9 @@ Result<std::int64_t> Trainer::take_in(StoredBatch batch) {
 
   const MutexLock lock(submit_mutex_);
   const bool repeated = store_.batch_record(batch.cell, batch.id).has_value();
-  const auto accepted = store_.add_batch(batch, job);
-  if (!accepted) return tl::make_unexpected(accepted.error());
-  if (!repeated) enqueue(*accepted, false);
-  return accepted->id;
+  const auto accepted = TRY(store_.add_batch(batch, job));
+  if (!repeated) enqueue(accepted, false);
+  return accepted.id;
 }
 
 Result<std::int64_t> Trainer::diagnose(const std::string& cell_name, const std::string& batch_id,
@@ -337,22 +333,19 @@ Result<std::int64_t> Trainer::look_at(StoredJob job, const std::string& batch_id
                                       const ChangeId& id) {
   const std::string& cell_name = job.cell;
   if (const auto before = queued_before(id); !before || *before) return before.map(the_job);
-  const auto cell = cells_.find(cell_name);
-  if (!cell) return tl::make_unexpected(cell.error());
+  const auto cell = TRY(cells_.find(cell_name));
   if (!batch_id.empty() && !csv.empty()) {
     return failure(ErrorCode::kUsage, "a {} is of a stored batch or of one that is sent, not of both",
                    job.kind == JobKind::kCheck ? "check" : "diagnosis");
   }
   job.created_at = unix_now();
   if (csv.empty()) {
-    const auto stored = batch_to_diagnose(cell_name, batch_id, apply);
-    if (!stored) return tl::make_unexpected(stored.error());
-    job.batch_ids = {*stored};
+    const auto stored = TRY(batch_to_diagnose(cell_name, batch_id, apply));
+    job.batch_ids = {stored};
   } else {
-    const auto batch = received_batch({"", csv, job.created_at}, **cell,
-                                      held_out_of_diagnosis(options_.validation_share, options_.seed, apply));
-    if (!batch) return tl::make_unexpected(batch.error());
-    if (const auto poses = static_cast<int>(batch->size()); poses > options_.max_poses) {
+    const auto batch = TRY(received_batch({"", csv, job.created_at}, *cell,
+                                          held_out_of_diagnosis(options_.validation_share, options_.seed, apply)));
+    if (const auto poses = static_cast<int>(batch.size()); poses > options_.max_poses) {
       return failure(ErrorCode::kTooLarge, "the batch has {} poses, limit {}", poses, options_.max_poses)
           .of("poses")
           .beyond(poses, options_.max_poses);
@@ -360,23 +353,20 @@ Result<std::int64_t> Trainer::look_at(StoredJob job, const std::string& batch_id
   }
   const MutexLock lock(submit_mutex_);
   if (const auto before = queued_before(id); !before || *before) return before.map(the_job);  // meanwhile
-  if (auto room = check_room(cell_name); !room) return tl::make_unexpected(room.error());
-  const auto accepted = store_.add_diagnosis(job, {csv, apply, "", ""}, id);
-  if (!accepted) return tl::make_unexpected(accepted.error());
-  enqueue(*accepted, true);
-  return accepted->id;
+  TRY(check_room(cell_name));
+  const auto accepted = TRY(store_.add_diagnosis(job, {csv, apply, "", ""}, id));
+  enqueue(accepted, true);
+  return accepted.id;
 }
 
 Result<std::string> Trainer::batch_to_diagnose(const std::string& cell_name, const std::string& batch_id,
                                                bool apply) const {
-  const auto stored = store_.batches(cell_name);
-  if (!stored) return tl::make_unexpected(stored.error());
-  if (stored->empty()) return failure(ErrorCode::kNotFound, "cell {} has no batch to diagnose", cell_name).of("batch");
-  const std::string& id = batch_id.empty() ? stored->back().id : batch_id;
+  const auto stored = TRY(store_.batches(cell_name));
+  if (stored.empty()) return failure(ErrorCode::kNotFound, "cell {} has no batch to diagnose", cell_name).of("batch");
+  const std::string& id = batch_id.empty() ? stored.back().id : batch_id;
   if (!apply) return id;
-  const auto asked = store_.batch_record(cell_name, id);
-  if (!asked) return tl::make_unexpected(asked.error());
-  if (const Status free = check_released(*asked); !free) return tl::make_unexpected(free.error());
+  const auto asked = TRY(store_.batch_record(cell_name, id));
+  TRY(check_released(asked));
   return id;
 }
 
@@ -384,39 +374,33 @@ Result<std::int64_t> Trainer::retrain(const std::string& cell_name, const std::v
                                       const std::string& level, const std::string& bias, Quarantine quarantine,
                                       const ChangeId& id) {
   if (const auto before = queued_before(id); !before || *before) return before.map(the_job);
-  const auto cell = cells_.find(cell_name);
-  if (!cell) return tl::make_unexpected(cell.error());
-  if (const Status known = check_spellings(**cell, level, bias); !known) return tl::make_unexpected(known.error());
-  if (const Status fits = check_most("batches", batch_ids.size(), kMostBatches, "batches in one training"); !fits)
-    return tl::make_unexpected(fits.error());
+  const auto cell = TRY(cells_.find(cell_name));
+  TRY(check_spellings(*cell, level, bias));
+  TRY(check_most("batches", batch_ids.size(), kMostBatches, "batches in one training"));
   const bool release = quarantine == Quarantine::kReleased;
   if (release && batch_ids.empty())
     return refused("to release a batch takes its id").of("batch").next("say which one is good");
-  const auto stored = store_.batches(cell_name);
-  if (!stored) return tl::make_unexpected(stored.error());
-  if (stored->empty())
-    return failure(ErrorCode::kNotFound, "cell {} has no batch to train from", cell_name).of("batch");
+  const auto stored = TRY(store_.batches(cell_name));
+  if (stored.empty()) return failure(ErrorCode::kNotFound, "cell {} has no batch to train from", cell_name).of("batch");
 
   StoredJob job;
   job.cell = cell_name;
-  job.batch_ids = batch_ids.empty() ? std::vector{stored->back().id} : batch_ids;
+  job.batch_ids = batch_ids.empty() ? std::vector{stored.back().id} : batch_ids;
   job.level = level;
   job.bias = bias;
   job.created_at = unix_now();
   if (batch_ids.empty()) {
-    auto earlier = earlier_sessions(store_, job, (*cell)->sessions, options_.max_poses);
-    if (!earlier) return tl::make_unexpected(earlier.error());
-    job.batch_ids.insert(job.batch_ids.begin(), earlier->begin(), earlier->end());
+    auto earlier = TRY(earlier_sessions(store_, job, cell->sessions, options_.max_poses));
+    job.batch_ids.insert(job.batch_ids.begin(), earlier.begin(), earlier.end());
   }
-  if (const Status fit = check_together(*stored, job.batch_ids, release); !fit) return tl::make_unexpected(fit.error());
+  TRY(check_together(stored, job.batch_ids, release));
 
   const MutexLock lock(submit_mutex_);
   if (const auto before = queued_before(id); !before || *before) return before.map(the_job);  // meanwhile
-  if (auto room = check_room(cell_name); !room) return tl::make_unexpected(room.error());
-  const auto accepted = store_.add_job(job, release, id);
-  if (!accepted) return tl::make_unexpected(accepted.error());
-  enqueue(*accepted, true);
-  return accepted->id;
+  TRY(check_room(cell_name));
+  const auto accepted = TRY(store_.add_job(job, release, id));
+  enqueue(accepted, true);
+  return accepted.id;
 }
 
 Status Trainer::check_together(const std::vector<StoredBatch>& stored, const std::vector<std::string>& batch_ids,
@@ -438,25 +422,22 @@ Status Trainer::check_together(const std::vector<StoredBatch>& stored, const std
 }
 
 Status Trainer::cancel(std::int64_t id, const ChangeId& by) {
-  const auto made = store_.outcome_of(by);
-  if (!made) return tl::make_unexpected(made.error());
-  if (*made) return {};
-  const auto job = store_.job(id);
-  if (!job) return tl::make_unexpected(job.error());
-  const auto asked_for = was_asked_for(*job);
-  if (!asked_for) return tl::make_unexpected(asked_for.error());
+  const auto made = TRY(store_.outcome_of(by));
+  if (made) return {};
+  const auto job = TRY(store_.job(id));
+  const auto asked_for = TRY(was_asked_for(job));
   const auto over = [id] { return failure(ErrorCode::kConflict, "job {} is over", id).of("job").with_value(id); };
-  if (job->state == JobState::kDone || job->state == JobState::kFailed) return over();
-  if (store_.is_shared()) return cancel_in_record(*job, by);
+  if (job.state == JobState::kDone || job.state == JobState::kFailed) return over();
+  if (store_.is_shared()) return cancel_in_record(job, by);
   const JobQueue::Cancelled found = queue_.cancel(id, by.who);
   if (found == JobQueue::Cancelled::kStopping) return {};
   if (found == JobQueue::Cancelled::kUnknown) return over();
   const JobOutcome outcome = cancelled_outcome(by.who);
   if (auto ended = store_.set_job_failed(id, outcome.why, outcome, by); !ended) {
-    queue_.push_front({id, job->cell, *asked_for});  // as if it had not been asked
+    queue_.push_front({id, job.cell, asked_for});  // as if it had not been asked
     return ended;
   }
-  JobProgress progress = progress_of(*job);
+  JobProgress progress = progress_of(job);
   progress.stage = JobStage::kFailed;
   progress.what = outcome.why;
   progress.outcome = outcome;
@@ -465,9 +446,8 @@ Status Trainer::cancel(std::int64_t id, const ChangeId& by) {
 }
 
 Status Trainer::activate(const std::string& cell, int version, const ChangeId& id, bool force) {
-  const auto made = store_.outcome_of(id);
-  if (!made) return tl::make_unexpected(made.error());
-  if (*made) return {};
+  const auto made = TRY(store_.outcome_of(id));
+  if (made) return {};
   const auto as_judged = [&](const ChangeId& decided) -> Status {
     if (const Status as_seen = store_.check_expected(cell, decided); !as_seen) return as_seen;
     const auto judged = judged_beside_present(cell, version);
@@ -481,10 +461,9 @@ Status Trainer::activate(const std::string& cell, int version, const ChangeId& i
   constexpr int kMostAttempts = 8;
   for (int attempt = 1;; ++attempt) {
     static_cast<void>(history_.follow(cell));
-    const auto recorded = store_.version_in_force(cell);
-    if (!recorded) return tl::make_unexpected(recorded.error());
+    const auto recorded = TRY(store_.version_in_force(cell));
     ChangeId decided = id;
-    if (!decided.expected_version) decided.expected_version = recorded->value_or(0);
+    if (!decided.expected_version) decided.expected_version = recorded.value_or(0);
     const Status done = as_judged(decided);
     const bool changed_meanwhile = !done && !id.expected_version && done.error().code == ErrorCode::kConflict;
     if (!changed_meanwhile || attempt == kMostAttempts) return done;
@@ -493,27 +472,23 @@ Status Trainer::activate(const std::string& cell, int version, const ChangeId& i
 
 Result<std::optional<GateVerdict>> Trainer::judged_beside_present(const std::string& cell_name, int version) const {
   const std::optional<GateVerdict> nothing_to_judge;
-  const auto cell = cells_.find(cell_name);
-  if (!cell) return tl::make_unexpected(cell.error());
+  const auto cell = TRY(cells_.find(cell_name));
   const auto present = registry_.in_force(cell_name);
   if (!present || present->version == version) return nothing_to_judge;
-  const auto asked = registry_.version(cell_name, version);
-  if (!asked) return tl::make_unexpected(asked.error());
+  const auto asked = TRY(registry_.version(cell_name, version));
   StoredJob nothing;
   nothing.cell = cell_name;
-  const auto sources = batch_sources(store_, nothing, true);
-  if (!sources) return tl::make_unexpected(sources.error());
-  if (sources->empty()) return nothing_to_judge;  // a person decides, and has
-  JobBatches batches(**cell, held_out_by_service(options_.validation_share, options_.seed), {});
-  for (const BatchSource& source : *sources) {
-    const auto stored = store_.batch(cell_name, source.id);
-    if (!stored) return tl::make_unexpected(stored.error());
-    batches.add({source.id, stored->csv, stored->accepted_at}, true);
+  const auto sources = TRY(batch_sources(store_, nothing, true));
+  if (sources.empty()) return nothing_to_judge;  // a person decides, and has
+  JobBatches batches(*cell, held_out_by_service(options_.validation_share, options_.seed), {});
+  for (const BatchSource& source : sources) {
+    const auto stored = TRY(store_.batch(cell_name, source.id));
+    batches.add({source.id, stored.csv, stored.accepted_at}, true);
   }
-  GateVerdict verdict = verdict_on((*asked)->model, present.get(), {}, {}, batches.judging_sessions(),
+  GateVerdict verdict = verdict_on(asked->model, present.get(), {}, {}, batches.judging_sessions(),
                                    {Bar::kBetter, options_.accept_ratio});
   verdict.why +=
-      fmt::format(" (judged by what {} batches hold out, the newest is {})", sources->size(), sources->back().id);
+      fmt::format(" (judged by what {} batches hold out, the newest is {})", sources.size(), sources.back().id);
   return std::optional(std::move(verdict));
 }
 
@@ -521,12 +496,11 @@ Status Trainer::check_not_worse(const std::string& cell, int version, const Gate
   const GateFigures& figures = verdict.figures;
   const bool has_figures = figures.before && figures.after;
   if (verdict.put_in_force || (has_figures && *figures.after <= options_.accept_ratio * *figures.before)) return {};
-  const auto made_here = store_.was_made_by_job(cell, version);
-  if (!made_here) return tl::make_unexpected(made_here.error());
+  const auto made_here = TRY(store_.was_made_by_job(cell, version));
   // The job that made it has said already that it could not be judged: whoever asks for it knows. What few judges find
   // worse by far is so all the same.
   const bool far_worse = has_figures && is_far_worse(*figures.before, *figures.after);
-  if (*made_here && !far_worse && (verdict.undecided || !has_figures)) return {};
+  if (made_here && !far_worse && (verdict.undecided || !has_figures)) return {};
   const char* how = has_figures ? "worse than" : "not known to be as good as";
   Failure worse =
       refused("cell {}: version {} is {} version {}, which is in force: {}", cell, version, how,
@@ -540,12 +514,12 @@ Status Trainer::check_not_worse(const std::string& cell, int version, const Gate
 }
 
 Status Trainer::release(const std::string& cell_name, const std::string& batch_id, const ChangeId& id) {
-  if (const auto found = cells_.find(cell_name); !found) return tl::make_unexpected(found.error());
+  TRY(cells_.find(cell_name));
   return store_.set_quarantine(cell_name, batch_id, "", id);
 }
 
 Status Trainer::discard(const std::string& cell_name, const std::string& batch_id, const ChangeId& id) {
-  if (const auto found = cells_.find(cell_name); !found) return tl::make_unexpected(found.error());
+  TRY(cells_.find(cell_name));
   return store_.discard(cell_name, batch_id, id);
 }
 
@@ -570,17 +544,15 @@ Result<std::vector<StoredBatch>> Trainer::quarantined(const std::string& cell_na
 Result<StoredDiagnosis> Trainer::diagnosis(std::int64_t job) const {
   auto found = store_.diagnosis(job);
   if (!found || !found->findings.empty()) return found;
-  const auto state = store_.job(job);
-  if (!state) return tl::make_unexpected(state.error());
-  if (state->state == JobState::kFailed) return refused("job {} failed: {}", job, state->message);
+  const auto state = TRY(store_.job(job));
+  if (state.state == JobState::kFailed) return refused("job {} failed: {}", job, state.message);
   return failure(ErrorCode::kBusy, "job {} is not done yet", job).of("job").with_value(job).next("try again later");
 }
 
 Result<JobProgress> Trainer::progress(std::int64_t job) const {
   if (auto running = book_.find(job)) return *running;
-  const auto stored = store_.job(job);
-  if (!stored) return tl::make_unexpected(stored.error());
-  return stored_progress(*stored);
+  const auto stored = TRY(store_.job(job));
+  return stored_progress(stored);
 }
 
 JobProgress Trainer::stored_progress(const StoredJob& job) const {
@@ -591,13 +563,11 @@ JobProgress Trainer::stored_progress(const StoredJob& job) const {
 }
 
 Result<std::vector<Trainer::DatedJob>> Trainer::jobs(const std::string& cell_name) const {
-  const auto stored = store_.recent_jobs(cell_name, kJobsListed);
-  if (!stored) return tl::make_unexpected(stored.error());
+  const auto stored = TRY(store_.recent_jobs(cell_name, kJobsListed));
   std::vector<DatedJob> jobs;
-  for (const StoredJob& job : *stored) {
-    auto now = progress(job.id);
-    if (!now) return tl::make_unexpected(now.error());
-    jobs.push_back({job, std::move(*now)});
+  for (const StoredJob& job : stored) {
+    auto now = TRY(progress(job.id));
+    jobs.push_back({job, std::move(now)});
   }
   return jobs;
 }

@@ -55,24 +55,23 @@ class Backup {
 
   Result<ControllerRobot> robot(const std::string& unit, const std::string& next) {
     if (!is_text_) return tl::make_unexpected(is_text_.error());
-    const Result<const ParameterInstance*> robot = choose(unit, next);
-    if (!robot) return tl::make_unexpected(robot.error());
-    cell_.unit = (*robot)->text("name");
-    cell_.robot_type = (*robot)->text("use_robot_type");
+    const const ParameterInstance* robot = TRY(choose(unit, next));
+    cell_.unit = robot->text("name");
+    cell_.robot_type = robot->text("use_robot_type");
     cell_.file = where_;
-    cell_.line = (*robot)->line;
-    cell_.axes = axes_of(**robot);
-    find_couplings(**robot);
-    for (const Status& read : {read_base(**robot), read_limits(**robot)}) {
+    cell_.line = robot->line;
+    cell_.axes = axes_of(*robot);
+    find_couplings(*robot);
+    for (const Status& read : {read_base(*robot), read_limits(*robot)}) {
       if (!read) return tl::make_unexpected(read.error());
     }
-    read_calibration(**robot);
+    read_calibration(*robot);
     return cell_;
   }
 
   Result<ControllerCell> read(const std::vector<SourceFile>& modules, const std::string& unit) {
-    if (const auto found = robot(unit, "--unit says which"); !found) return tl::make_unexpected(found.error());
-    if (const Status read = read_modules(modules); !read) return tl::make_unexpected(read.error());
+    TRY(robot(unit, "--unit says which"));
+    TRY(read_modules(modules));
     return std::move(cell_);
   }
 

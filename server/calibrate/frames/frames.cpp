@@ -68,23 +68,20 @@ std::vector<Pose> in_world(const Pose& X_WB, const std::vector<Pose>& X_BF) {
 Status locate_base(const ToolPoses& poses, const Pose& X_FT, PhysicalModel& model) {
   Eigen::Matrix3Xd p_B(3, static_cast<Eigen::Index>(poses.X_BF.size()));
   for (std::size_t i = 0; i < poses.X_BF.size(); ++i) p_B.col(static_cast<int>(i)) = poses.X_BF[i] * X_FT.translation();
-  const Result<Pose> X_WB = fit_transform(poses.p_W(), p_B);
-  if (!X_WB) return tl::make_unexpected(X_WB.error());
-  model.X_WB = *X_WB;
+  const Pose X_WB = TRY(fit_transform(poses.p_W(), p_B));
+  model.X_WB = X_WB;
   return {};
 }
 
 /// The tool from a base that is known.
 Status locate_tool_at(const ToolPoses& poses, Pose& X_FT, const PhysicalModel& model) {
   if (poses.full()) {
-    const Result<Pose> found = locate_tool(poses.oriented_X_WT, in_world(model.X_WB, poses.oriented_X_BF));
-    if (!found) return tl::make_unexpected(found.error());
-    X_FT = *found;
+    const Pose found = TRY(locate_tool(poses.oriented_X_WT, in_world(model.X_WB, poses.oriented_X_BF)));
+    X_FT = found;
     return {};
   }
-  const Result<Vector3> point = locate_tool_point(poses.p_W(), in_world(model.X_WB, poses.X_BF));
-  if (!point) return tl::make_unexpected(point.error());
-  X_FT = make_pose(Matrix3::Identity(), *point);
+  const Vector3 point = TRY(locate_tool_point(poses.p_W(), in_world(model.X_WB, poses.X_BF)));
+  X_FT = make_pose(Matrix3::Identity(), point);
   return {};
 }
 
@@ -143,10 +140,9 @@ Status locate_unknown_frames(PhysicalModel& model, const MeasurementBatch& batch
       const auto locate = has_base(model) ? locate_tool_near : locate_tool_at;
       if (const Status located = locate(poses, model.tools[tool], model); !located) return located;
     } else {
-      const Result<BaseAndTool> found = locate_both(poses);
-      if (!found) return tl::make_unexpected(found.error());
-      model.X_WB = found->X_WB;
-      model.tools[tool] = found->X_FT;
+      const BaseAndTool found = TRY(locate_both(poses));
+      model.X_WB = found.X_WB;
+      model.tools[tool] = found.X_FT;
     }
     base_known = true;
   }

@@ -78,7 +78,7 @@ Result<BaseAndTool> locate_base_and_tool(const std::vector<Pose>& X_WT, const st
     return refused("base and tool: {} full poses, at least 3 are needed", X_WT.size()).beyond(X_WT.size(), 3);
   Result<BaseAndTool> found = locate_rotations(X_WT, X_BF);
   if (!found) return found;
-  if (const Status added = add_translations(X_WT, X_BF, *found); !added) return tl::make_unexpected(added.error());
+  TRY(add_translations(X_WT, X_BF, *found));
   return found;
 }
 
@@ -128,9 +128,8 @@ Result<BaseAndTool> locate_base_and_tool_point(const Eigen::Matrix3Xd& p_W, cons
   Eigen::Matrix3Xd p_B(3, p_W.cols());
   for (int round = 0; round < kMostAlternations; ++round) {
     for (std::size_t i = 0; i < X_BF.size(); ++i) p_B.col(static_cast<int>(i)) = X_BF[i] * found.X_FT.translation();
-    const Result<Pose> X_WB = fit_transform(p_W, p_B);
-    if (!X_WB) return tl::make_unexpected(X_WB.error());
-    found.X_WB = *X_WB;
+    const Pose X_WB = TRY(fit_transform(p_W, p_B));
+    found.X_WB = X_WB;
     const double step = solve_point(p_W, X_BF, mean_R, found);
     if (!std::isfinite(step)) return refused("base and tool: the positions do not determine the tool point");
     if (step < kLastStep) break;

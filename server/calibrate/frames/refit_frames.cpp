@@ -115,9 +115,8 @@ Status locate_refitted_frames(const PhysicalModel& before, const MeasurementBatc
   }
   std::string found_with_base;
   if (base && !known.empty()) {
-    const Result<Pose> found = base_under(known);
-    if (!found) return tl::make_unexpected(found.error());
-    X_WB = *found;
+    const Pose found = TRY(base_under(known));
+    X_WB = found;
   } else if (base) {
     const Result<BaseAndTool> found = base_and_tool(tools.begin()->second);
     if (!found) return tl::make_unexpected(with_advice(found.error()));
@@ -127,9 +126,8 @@ Status locate_refitted_frames(const PhysicalModel& before, const MeasurementBatc
   }
   for (const auto& [name, poses] : tools) {
     if (!to_find(name) || name == found_with_base) continue;
-    const Result<Pose> X_FT = tool_on(X_WB, poses);
-    if (!X_FT) return tl::make_unexpected(X_FT.error());
-    model.tools[name] = *X_FT;
+    const Pose X_FT = TRY(tool_on(X_WB, poses));
+    model.tools[name] = X_FT;
   }
   if (base) place_base(model, X_WB);
   return {};

@@ -157,11 +157,10 @@ Status check_told(const std::string& id, const Lengths& of) {
 Result<std::vector<std::string>> with_instruments(std::vector<std::string> specs, const Cell& cell,
                                                   const MeasurementBatch& batch) {
   if (!has_gauges(batch)) return specs;
-  const Result<Anchors> anchors = anchors_of(cell);
-  if (!anchors) return tl::make_unexpected(anchors.error());
+  const Anchors anchors = TRY(anchors_of(cell));
   const bool open = std::any_of(batch.measurements.begin(), batch.measurements.end(), [&](const Measurement& m) {
-    const auto anchor = m.gauge ? anchors->find(m.gauge->anchor) : anchors->end();
-    return anchor != anchors->end() && anchor->second.zero_open;
+    const auto anchor = m.gauge ? anchors.find(m.gauge->anchor) : anchors.end();
+    return anchor != anchors.end() && anchor->second.zero_open;
   });
   const auto add = [&](std::string_view spec) {
     if (std::find(specs.begin(), specs.end(), spec) == specs.end()) specs.emplace_back(spec);

@@ -240,9 +240,8 @@ Result<Identified> settle(const CalibrationProblem& problem, const CalibrateOpti
   for (int round = 0; round < kMostReweightings; ++round) {
     Freedom freedom;
     if (s.scale.size() > 0) {
-      Result<Minimum> found = minimise(working, s, now.weights, options, now.minimum.x);
-      if (!found) return tl::make_unexpected(found.error());
-      now.minimum = std::move(*found);
+      Minimum found = TRY(minimise(working, s, now.weights, options, now.minimum.x));
+      now.minimum = std::move(found);
       result.iterations += static_cast<int>(now.minimum.costs.size());
       result.cost_record.insert(result.cost_record.end(), now.minimum.costs.begin(), now.minimum.costs.end());
       freedom = fitted(working, s, now.weights, is_robust(options, now.weights), now.minimum);
@@ -271,23 +270,22 @@ Result<CalibrationResult> identify(const CalibrationProblem& problem, const Cali
   const Eigen::Index P = s.values.size();
   CalibrationResult result;
   result.model = problem.model;
-  const Result<Identified> found = settle(problem, options, s, result);
-  if (!found) return tl::make_unexpected(found.error());
-  const Residuals& r = found->residuals;
-  result.model.values = s.values_at(found->minimum.x);
-  result.discrepancy = found->weights.discrepancy;
-  result.discrepancy_rotation = found->weights.discrepancy_rotation;
-  result.discrepancy_of_pose = found->weights.of_pose;
-  result.log_evidence = result.log_likelihood = log_likelihood(r, found->weights);
-  result.suspects = suspects_of(problem.batch, r, found->weights);
+  const Identified found = TRY(settle(problem, options, s, result));
+  const Residuals& r = found.residuals;
+  result.model.values = s.values_at(found.minimum.x);
+  result.discrepancy = found.weights.discrepancy;
+  result.discrepancy_rotation = found.weights.discrepancy_rotation;
+  result.discrepancy_of_pose = found.weights.of_pose;
+  result.log_evidence = result.log_likelihood = log_likelihood(r, found.weights);
+  result.suspects = suspects_of(problem.batch, r, found.weights);
   result.rms = r.rms();
-  result.converged = found->minimum.converged;
-  result.sessions = found->sessions;
-  result.message = found->minimum.message;
+  result.converged = found.minimum.converged;
+  result.sessions = found.sessions;
+  result.message = found.minimum.message;
   result.covariance = Eigen::MatrixXd::Zero(P, P);
   if (P == 0) return result;
-  if (const Status belongs = check_belongs(problem.batch, r); !belongs) return tl::make_unexpected(belongs.error());
-  add_posterior(found->minimum.information, s, problem.batch.measurements.size(), result);
+  TRY(check_belongs(problem.batch, r));
+  add_posterior(found.minimum.information, s, problem.batch.measurements.size(), result);
   return result;
 }
 

@@ -146,15 +146,14 @@ Status search_orders(CalibrationProblem& problem, const CalibrateOptions& option
   }
   const std::vector<Eigen::Index> first = first_values(model);
   while (!open.empty()) {
-    const Result<CalibrationResult> found = identify({without(model, open), problem.batch}, options);
-    if (!found) return tl::make_unexpected(found.error());
-    const MeasurementBatch batch = aligned(problem.batch, found->sessions, model.cell->tracker);
-    const Residuals r = residuals_of(found->model, batch, found->model.values);
-    const Weights weights = weights_of(*found, batch);
+    const CalibrationResult found = TRY(identify({without(model, open), problem.batch}, options));
+    const MeasurementBatch batch = aligned(problem.batch, found.sessions, model.cell->tracker);
+    const Residuals r = residuals_of(found.model, batch, found.model.values);
+    const Weights weights = weights_of(found, batch);
     FoundOrder best;
     std::size_t strongest = open.front();
     for (const std::size_t k : open) {
-      const FoundOrder candidate = best_order(*model.sources[k], found->model, batch, r, weights);
+      const FoundOrder candidate = best_order(*model.sources[k], found.model, batch, r, weights);
       if (candidate.gain > best.gain) {
         best = candidate;
         strongest = k;

@@ -49,9 +49,8 @@ struct ArcColumns {
 };
 
 Result<ArcColumns> find_columns(const CsvTable& table, const std::string& where, const Chain& robot) {
-  Result<PoseColumns> posture = PoseColumns::find(table);
-  if (!posture) return tl::make_unexpected(posture.error());
-  const std::size_t held = posture->joint_types().size();
+  PoseColumns posture = TRY(PoseColumns::find(table));
+  const std::size_t held = posture.joint_types().size();
   if (held != 0 && held != static_cast<std::size_t>(robot.size())) {
     return refused("{} posture columns, robot {} has {} joints", held, robot.name(), robot.size())
         .in(where)
@@ -59,36 +58,31 @@ Result<ArcColumns> find_columns(const CsvTable& table, const std::string& where,
   }
   std::array<std::size_t, 5> found{};
   for (std::size_t k = 0; const char* name : {"joint", "q_deg", "x_mm", "y_mm", "z_mm"}) {
-    const Result<std::size_t> column = table.require(name);
-    if (!column) return tl::make_unexpected(column.error());
-    found[k++] = *column;
+    const std::size_t column = TRY(table.require(name));
+    found[k++] = column;
   }
   return ArcColumns{.joint = found[0],
                     .angle = found[1],
                     .position = {found[2], found[3], found[4]},
                     .reflector = table.find("reflector"),
-                    .posture = std::move(*posture)};
+                    .posture = std::move(posture)};
 }
 
 Result<ArcPoint> read_point(const CsvTable& table, std::size_t row, const ArcColumns& columns, const Chain& robot) {
-  const Result<int> joint = table.integer(row, columns.joint, 1, robot.size());
-  if (!joint) return tl::make_unexpected(joint.error());
+  const int joint = TRY(table.integer(row, columns.joint, 1, robot.size()));
   ArcPoint point;
-  point.joint = *joint - 1;
+  point.joint = joint - 1;
   point.row = table.line(row);
   point.q = JointVector::Zero(robot.size());
   if (!columns.posture.joint_types().empty()) {
-    const Result<JointVector> q = columns.posture.joints(table, row);
-    if (!q) return tl::make_unexpected(q.error());
-    point.q = *q;
+    const JointVector q = TRY(columns.posture.joints(table, row));
+    point.q = q;
   }
-  const Result<double> angle = table.number(row, columns.angle);
-  if (!angle) return tl::make_unexpected(angle.error());
-  point.q(point.joint) = from_deg(*angle);
+  const double angle = TRY(table.number(row, columns.angle));
+  point.q(point.joint) = from_deg(angle);
   for (std::size_t k = 0; k < 3; ++k) {
-    const Result<double> mm = table.number(row, columns.position[k], to_mm(kPointLimit));
-    if (!mm) return tl::make_unexpected(mm.error());
-    point.p_W(static_cast<Eigen::Index>(k)) = from_mm(*mm);
+    const double mm = TRY(table.number(row, columns.position[k], to_mm(kPointLimit)));
+    point.p_W(static_cast<Eigen::Index>(k)) = from_mm(mm);
   }
   if (columns.reflector) point.reflector = table.field(row, *columns.reflector);
   return point;
@@ -97,15 +91,12 @@ Result<ArcPoint> read_point(const CsvTable& table, std::size_t row, const ArcCol
 }  // namespace
 
 Result<ArcList> parse_arcs_csv(const std::string& text, const std::string& where, const Chain& robot) {
-  const Result<CsvTable> table = CsvTable::parse(text, where);
-  if (!table) return tl::make_unexpected(table.error());
-  const Result<ArcColumns> columns = find_columns(*table, where, robot);
-  if (!columns) return tl::make_unexpected(columns.error());
+  const CsvTable table = TRY(CsvTable::parse(text, where));
+  const ArcColumns columns = TRY(find_columns(table, where, robot));
   ArcList arcs{where, {}};
-  for (std::size_t row = 0; row < table->size(); ++row) {
-    Result<ArcPoint> point = read_point(*table, row, *columns, robot);
-    if (!point) return tl::make_unexpected(point.error());
-    arcs.points.push_back(std::move(*point));
+  for (std::size_t row = 0; row < table.size(); ++row) {
+    ArcPoint point = TRY(read_point(table, row, columns, robot));
+    arcs.points.push_back(std::move(point));
   }
   return arcs;
 }
@@ -152,16 +143,15 @@ Status check_held(const std::vector<const ArcPoint*>& points, const JointArcs& g
 }  // namespace
 
 Result<std::vector<JointArcs>> sorted_by_joint(const Chain& robot, const ArcList& arcs, bool sigma_stated) {
-  if (const Status fits = check_robot(robot, arcs); !fits) return tl::make_unexpected(fits.error());
+  TRY(check_robot(robot, arcs));
   std::map<std::pair<int, std::string>, std::vector<const ArcPoint*>> by_arc;
   for (const ArcPoint& point : arcs.points) by_arc[{point.joint, point.reflector}].push_back(&point);
   std::vector<JointArcs> joints(static_cast<std::size_t>(robot.size()));
   for (const auto& [key, points] : by_arc) {
     JointArcs& group = joints[static_cast<std::size_t>(key.first)];
-    if (const Status enough = check_size(points, arcs, sigma_stated); !enough)
-      return tl::make_unexpected(enough.error());
+    TRY(check_size(points, arcs, sigma_stated));
     if (group.arcs.empty()) group.posture = points.front()->q;
-    if (const Status held = check_held(points, group, arcs); !held) return tl::make_unexpected(held.error());
+    TRY(check_held(points, group, arcs));
     group.arcs.push_back(points);
   }
   for (int j = 0; j < robot.size(); ++j) {

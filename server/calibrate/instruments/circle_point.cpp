@@ -82,9 +82,8 @@ Result<Eigen::VectorXd> changed_deviations(const Chain& robot, const std::vector
   } else {
     lines[i].c += move;
   }
-  const Result<Links> links = links_of(robot, at_zero(robot, groups, lines));
-  if (!links) return tl::make_unexpected(links.error());
-  return deviations(robot, members, links->links);
+  const Links links = TRY(links_of(robot, at_zero(robot, groups, lines)));
+  return deviations(robot, members, links.links);
 }
 
 /// Covariance of the deviations: first derivatives by central differences, a step of one standard deviation each way.
@@ -168,20 +167,18 @@ void add_variance(const AxisFit& fit, double stated_sigma, Fits& fits) {
 /// Fits the arcs of one joint, and adds axis and circles to `result`.
 Status add_joint(const JointArcs& group, const ArcList& arcs, double stated_sigma, Fits& fits,
                  CirclePointResult& result) {
-  Result<AxisFit> fit = axis_fit(group, arcs.where);
-  if (!fit) return tl::make_unexpected(fit.error());
-  const Result<double> angle_rms = orient(*fit, group, arcs.where);
-  if (!angle_rms) return tl::make_unexpected(angle_rms.error());
-  add_variance(*fit, stated_sigma, fits);
+  AxisFit fit = TRY(axis_fit(group, arcs.where));
+  const double angle_rms = TRY(orient(fit, group, arcs.where));
+  add_variance(fit, stated_sigma, fits);
   const double variance = fits.variance.back() * fits.widening.back();
   JointAxis axis;
   axis.sigma = std::sqrt(fits.variance.back());
-  axis.freedom = fit->freedom;
-  axis.angle_rms = *angle_rms;
-  axis.direction_u = worst_u(variance * fit->normal_inverse.topLeftCorner<2, 2>());
+  axis.freedom = fit.freedom;
+  axis.angle_rms = angle_rms;
+  axis.direction_u = worst_u(variance * fit.normal_inverse.topLeftCorner<2, 2>());
   result.axes.push_back(axis);
-  describe_circles(group, *fit, variance, result.circles);
-  fits.axes.push_back(std::move(*fit));
+  describe_circles(group, fit, variance, result.circles);
+  fits.axes.push_back(std::move(fit));
   return {};
 }
 
@@ -216,24 +213,20 @@ Status add_links(const Chain& robot, const ArcList& arcs, const std::vector<Join
     result.axes[i].direction_W = lines[i].n;
     result.axes[i].point_W = lines[i].c;
   }
-  const Result<Links> links = links_of(robot, lines);
-  if (!links) return tl::make_unexpected(links.error());
+  const Links links = TRY(links_of(robot, lines));
   const std::vector<NamedMember> members = members_of(robot);
-  const Eigen::VectorXd deviation = deviations(robot, members, links->links);
-  Result<Eigen::MatrixXd> covariance = propagated(robot, groups, fits, members);
-  if (!covariance) return tl::make_unexpected(covariance.error());
+  const Eigen::VectorXd deviation = deviations(robot, members, links.links);
+  Eigen::MatrixXd covariance = TRY(propagated(robot, groups, fits, members));
   for (std::size_t k = 0; k < members.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
-    Result<MeasuredParameter> parameter =
-        measured_parameter(members[k], robot, deviation(at), (*covariance)(at, at), arcs.where);
-    if (!parameter) return tl::make_unexpected(parameter.error());
-    result.parameters.push_back(std::move(*parameter));
+    MeasuredParameter parameter =
+        TRY(measured_parameter(members[k], robot, deviation(at), (covariance)(at, at), arcs.where));
+    result.parameters.push_back(std::move(parameter));
   }
-  result.covariance = std::move(*covariance);
-  result.X_WB = links->X_WB;
-  Result<Chain> measured = with_links(robot, links->links);
-  if (!measured) return tl::make_unexpected(measured.error());
-  result.robot = std::move(*measured);
+  result.covariance = std::move(covariance);
+  result.X_WB = links.X_WB;
+  Chain measured = TRY(with_links(robot, links.links));
+  result.robot = std::move(measured);
   return {};
 }
 
@@ -241,16 +234,13 @@ Status add_links(const Chain& robot, const ArcList& arcs, const std::vector<Join
 
 Result<CirclePointResult> analyse_circle_points(const Chain& robot, const ArcList& arcs,
                                                 const CirclePointOptions& options) {
-  const Result<std::vector<JointArcs>> groups = sorted_by_joint(robot, arcs, options.sigma.has_value());
-  if (!groups) return tl::make_unexpected(groups.error());
+  const std::vector<JointArcs> groups = TRY(sorted_by_joint(robot, arcs, options.sigma.has_value()));
   CirclePointResult result;
   Fits fits;
-  for (const JointArcs& group : *groups) {
-    if (const Status added = add_joint(group, arcs, options.sigma.value_or(0), fits, result); !added)
-      return tl::make_unexpected(added.error());
+  for (const JointArcs& group : groups) {
+    TRY(add_joint(group, arcs, options.sigma.value_or(0), fits, result));
   }
-  if (const Status added = add_links(robot, arcs, *groups, fits, result); !added)
-    return tl::make_unexpected(added.error());
+  TRY(add_links(robot, arcs, groups, fits, result));
   return result;
 }
 

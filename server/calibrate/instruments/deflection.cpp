@@ -214,12 +214,11 @@ Result<std::optional<std::set<double>>> held_out_loads(const DeflectionData& dat
 }
 
 Result<Split> split_of(const DeflectionData& data, const DeflectionOptions& options) {
-  const Result<std::optional<std::set<double>>> by_load = held_out_loads(data, options);
-  if (!by_load) return tl::make_unexpected(by_load.error());
+  const std::optional<std::set<double>> by_load = TRY(held_out_loads(data, options));
   Split split;
   std::set<double> training, validation;
   for (const DeflectionReading& reading : data.readings) {
-    const bool out = *by_load ? (*by_load)->contains(reading.load) : reading.validation.value_or(false);
+    const bool out = by_load ? by_load->contains(reading.load) : reading.validation.value_or(false);
     (out ? split.validation : split.train).push_back(&reading);
     (out ? validation : training).insert(reading.load);
   }
@@ -373,27 +372,23 @@ ElementResult element_result(const BothModels& models, std::size_t e) {
 }  // namespace
 
 Result<DeflectionResult> fit_deflection(const DeflectionData& data, const DeflectionOptions& options) {
-  const Result<Split> split = split_of(data, options);
-  if (!split) return tl::make_unexpected(split.error());
+  const Split split = TRY(split_of(data, options));
   const std::set<int> load_biases(options.load_bias.begin(), options.load_bias.end());
-  const Result<std::set<int>> beams = beams_of(data, *split, load_biases);
-  if (!beams) return tl::make_unexpected(beams.error());
-  const Result<Solved> with = solve(data, split->train, options, *beams, load_biases);
-  if (!with) return tl::make_unexpected(with.error());
-  const Result<Solved> without = solve(data, split->train, options, {}, load_biases);
-  if (!without) return tl::make_unexpected(without.error());
-  const BothModels models{data, options, *split, *beams, load_biases, *with, *without};
+  const std::set<int> beams = TRY(beams_of(data, split, load_biases));
+  const Solved with = TRY(solve(data, split.train, options, beams, load_biases));
+  const Solved without = TRY(solve(data, split.train, options, {}, load_biases));
+  const BothModels models{data, options, split, beams, load_biases, with, without};
 
   DeflectionResult result;
-  result.training_loads = split->training_loads;
-  result.validation_loads = split->validation_loads;
-  result.freedom = with->freedom();
-  result.variance_factor = with->factor();
+  result.training_loads = split.training_loads;
+  result.validation_loads = split.validation_loads;
+  result.freedom = with.freedom();
+  result.variance_factor = with.factor();
   for (std::size_t e = 0; e < data.elements.size(); ++e) result.elements.push_back(element_result(models, e));
-  const auto& shown = split->validation.empty() ? split->train : split->validation;
+  const auto& shown = split.validation.empty() ? split.train : split.validation;
   result.rms_still = rms_of(shown, data, nullptr, options.chained, 0);
-  result.rms_beam = rms_of(shown, data, &*with, options.chained, 0);
-  result.rms_rigid = rms_of(shown, data, &*without, options.chained, 0);
+  result.rms_beam = rms_of(shown, data, &with, options.chained, 0);
+  result.rms_rigid = rms_of(shown, data, &without, options.chained, 0);
   return result;
 }
 

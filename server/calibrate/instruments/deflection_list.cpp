@@ -21,9 +21,8 @@ struct DeflectionColumns {
 Result<DeflectionColumns> find_columns(const CsvTable& table) {
   DeflectionColumns columns{.required = {}, .sigma = table.find("sigma_mm"), .set = table.find("set")};
   for (const char* name : {"element", "load_n", "x_mm", "dx_mm", "dz_mm", "theta_deg", "length_mm", "lever_mm"}) {
-    const Result<std::size_t> column = table.require(name);
-    if (!column) return tl::make_unexpected(column.error());
-    columns.required[name] = *column;
+    const std::size_t column = TRY(table.require(name));
+    columns.required[name] = column;
   }
   return columns;
 }
@@ -37,13 +36,11 @@ struct DeflectionRow {
 Result<DeflectionRow> read_row(const CsvTable& table, std::size_t row, const DeflectionColumns& columns) {
   DeflectionRow read;
   for (const auto& [name, column] : columns.required) {
-    const Result<double> number = table.number(row, column);
-    if (!number) return tl::make_unexpected(number.error());
-    read.value[name] = *number;
+    const double number = TRY(table.number(row, column));
+    read.value[name] = number;
   }
-  const Result<int> element = table.integer(row, columns.required.at("element"), 1, kMostElements);
-  if (!element) return tl::make_unexpected(element.error());
-  read.element = *element;
+  const int element = TRY(table.integer(row, columns.required.at("element"), 1, kMostElements));
+  read.element = element;
   if (!(read.value["length_mm"] > 0))
     return table.refuse(row, "length_mm is {}, must be above 0", read.value["length_mm"])
         .of("length_mm")
@@ -53,11 +50,10 @@ Result<DeflectionRow> read_row(const CsvTable& table, std::size_t row, const Def
 
 Result<std::optional<double>> read_sigma(const CsvTable& table, std::size_t row, std::optional<std::size_t> column) {
   if (!column || table.field(row, *column).empty()) return std::nullopt;
-  const Result<double> number = table.number(row, *column);
-  if (!number) return tl::make_unexpected(number.error());
-  if (!(*number > 0))
-    return table.refuse(row, "sigma_mm is {}, must be above 0", *number).of("sigma_mm").beyond(*number, 0);
-  return from_mm(*number);
+  const double number = TRY(table.number(row, *column));
+  if (!(number > 0))
+    return table.refuse(row, "sigma_mm is {}, must be above 0", number).of("sigma_mm").beyond(number, 0);
+  return from_mm(number);
 }
 
 /// Whether the row is one of validation; empty where nothing says it.
@@ -71,42 +67,36 @@ Result<std::optional<bool>> read_set(const CsvTable& table, std::size_t row, std
 
 Result<DeflectionReading> read_reading(const CsvTable& table, std::size_t row, const DeflectionColumns& columns,
                                        DeflectionRow& read) {
-  const Result<std::optional<double>> sigma = read_sigma(table, row, columns.sigma);
-  if (!sigma) return tl::make_unexpected(sigma.error());
-  const Result<std::optional<bool>> validation = read_set(table, row, columns.set);
-  if (!validation) return tl::make_unexpected(validation.error());
+  const std::optional<double> sigma = TRY(read_sigma(table, row, columns.sigma));
+  const std::optional<bool> validation = TRY(read_set(table, row, columns.set));
   return DeflectionReading{.element = read.element,
                            .load = read.value["load_n"],
                            .x = from_mm(read.value["x_mm"]),
                            .moved = {from_mm(read.value["dx_mm"]), from_mm(read.value["dz_mm"])},
-                           .sigma = *sigma,
-                           .validation = *validation,
+                           .sigma = sigma,
+                           .validation = validation,
                            .row = table.line(row)};
 }
 
 }  // namespace
 
 Result<DeflectionData> parse_deflection_csv(const std::string& text, const std::string& where) {
-  const Result<CsvTable> table = CsvTable::parse(text, where);
-  if (!table) return tl::make_unexpected(table.error());
-  const Result<DeflectionColumns> columns = find_columns(*table);
-  if (!columns) return tl::make_unexpected(columns.error());
+  const CsvTable table = TRY(CsvTable::parse(text, where));
+  const DeflectionColumns columns = TRY(find_columns(table));
   std::map<int, DeflectionElement> elements;
   DeflectionData data{where, {}, {}};
-  for (std::size_t row = 0; row < table->size(); ++row) {
-    Result<DeflectionRow> read = read_row(*table, row, *columns);
-    if (!read) return tl::make_unexpected(read.error());
-    const DeflectionElement stands{read->element, from_deg(read->value["theta_deg"]), from_mm(read->value["length_mm"]),
-                                   from_mm(read->value["lever_mm"])};
-    const DeflectionElement& first = elements.emplace(read->element, stands).first->second;
+  for (std::size_t row = 0; row < table.size(); ++row) {
+    DeflectionRow read = TRY(read_row(table, row, columns));
+    const DeflectionElement stands{read.element, from_deg(read.value["theta_deg"]), from_mm(read.value["length_mm"]),
+                                   from_mm(read.value["lever_mm"])};
+    const DeflectionElement& first = elements.emplace(read.element, stands).first->second;
     if (first.theta != stands.theta || first.length != stands.length || first.lever != stands.lever) {
-      return table->refuse(row, "element {} stands or hangs otherwise than in its first row", read->element)
+      return table.refuse(row, "element {} stands or hangs otherwise than in its first row", read.element)
           .of("element")
-          .with_value(read->element);
+          .with_value(read.element);
     }
-    Result<DeflectionReading> reading = read_reading(*table, row, *columns, *read);
-    if (!reading) return tl::make_unexpected(reading.error());
-    data.readings.push_back(std::move(*reading));
+    DeflectionReading reading = TRY(read_reading(table, row, columns, read));
+    data.readings.push_back(std::move(reading));
   }
   for (const auto& [number, element] : elements) data.elements.push_back(element);
   return data;

@@ -91,19 +91,17 @@ Result<Links> links_of(const Chain& robot, const std::vector<AxisLine>& lines) {
   X.translation() = lines.front().c;
   if (robot.size() > 1) {
     const Joint& nominal = robot.joint(0);
-    const Result<LinkGeometry> first = row_to(seen_from(X, lines[1]), nominal, 0, robot.name());
-    if (!first) return tl::make_unexpected(first.error());
-    X.translate((nominal.hayati ? 0 : first->d - nominal.link.d) * Vector3::UnitZ());
-    X.rotate(Eigen::AngleAxisd(first->theta - nominal.link.theta, Vector3::UnitZ()));
+    const LinkGeometry first = TRY(row_to(seen_from(X, lines[1]), nominal, 0, robot.name()));
+    X.translate((nominal.hayati ? 0 : first.d - nominal.link.d) * Vector3::UnitZ());
+    X.rotate(Eigen::AngleAxisd(first.theta - nominal.link.theta, Vector3::UnitZ()));
   }
   out.X_WB = X;
   for (int i = 0; i + 1 < robot.size(); ++i) {
     const Joint& nominal = robot.joint(i);
-    const Result<LinkGeometry> link =
-        row_to(seen_from(X, lines[static_cast<std::size_t>(i) + 1]), nominal, i, robot.name());
-    if (!link) return tl::make_unexpected(link.error());
-    out.links.push_back(*link);
-    X = X * row_pose(*link, nominal.hayati);
+    const LinkGeometry link =
+        TRY(row_to(seen_from(X, lines[static_cast<std::size_t>(i) + 1]), nominal, i, robot.name()));
+    out.links.push_back(link);
+    X = X * row_pose(link, nominal.hayati);
   }
   out.links.push_back(robot.joint(robot.size() - 1).link);
   return out;

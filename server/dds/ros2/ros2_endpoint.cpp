@@ -30,15 +30,13 @@ class Ros2Replies final : public ReplySink, private wire::dds::DataWriterListene
   using Message = typename Ros::Reply::type;
 
   [[nodiscard]] static Result<std::unique_ptr<Ros2Replies>> open(ServiceCore& core, WorkUnderWay& writing) {
-    const auto topic = wire::make_topic(core.participant, Ros::kReplyTopic,
-                                        new wire::SafeType<typename Ros::Reply>(Ros::Operation::kMaxSample));
-    if (!topic) return tl::make_unexpected(topic.error());
+    const auto topic = TRY(wire::make_topic(core.participant, Ros::kReplyTopic,
+                                            new wire::SafeType<typename Ros::Reply>(Ros::Operation::kMaxSample)));
     std::unique_ptr<Ros2Replies> replies(new Ros2Replies(core, writing));
     replies->publisher_ = core.participant.create_publisher(wire::publisher_qos({}));
     if (replies->publisher_ != nullptr)
-      replies->writer_ =
-          replies->publisher_->create_datawriter(*topic, wire::call_writer_qos(wire::kReplyDepth), replies.get(),
-                                                 wire::dds::StatusMask::publication_matched());
+      replies->writer_ = replies->publisher_->create_datawriter(
+          topic, wire::call_writer_qos(wire::kReplyDepth), replies.get(), wire::dds::StatusMask::publication_matched());
     if (replies->writer_ == nullptr)
       return failure(ErrorCode::kInternal, "cannot create the writer of {}", Ros::kReplyTopic);
     replies->start();
@@ -145,16 +143,14 @@ class Ros2Endpoint final : public RequestEndpointBase, private wire::dds::DataRe
 
   [[nodiscard]] static Result<std::unique_ptr<RequestEndpointBase>> open(ServiceCore& core, Lane& lane,
                                                                          WorkUnderWay& writing) {
-    const auto topic =
+    const auto topic = TRY(
         wire::make_topic(core.participant, Ros::kRequestTopic,
-                         new wire::ReceivedMessageType<typename Ros::Request>(Operation::kMaxSample, core.unreadable));
-    if (!topic) return tl::make_unexpected(topic.error());
-    auto replies = Ros2Replies<Ros>::open(core, writing);
-    if (!replies) return tl::make_unexpected(replies.error());
-    std::unique_ptr<Ros2Endpoint> endpoint(new Ros2Endpoint(core, lane, std::move(*replies)));
+                         new wire::ReceivedMessageType<typename Ros::Request>(Operation::kMaxSample, core.unreadable)));
+    auto replies = TRY(Ros2Replies<Ros>::open(core, writing));
+    std::unique_ptr<Ros2Endpoint> endpoint(new Ros2Endpoint(core, lane, std::move(replies)));
     const auto heard = wire::dds::StatusMask::data_available() << wire::dds::StatusMask::sample_lost();
     endpoint->reader_ =
-        core.subscriber.create_datareader(*topic, wire::call_reader_qos(wire::kRequestDepth), endpoint.get(), heard);
+        core.subscriber.create_datareader(topic, wire::call_reader_qos(wire::kRequestDepth), endpoint.get(), heard);
     if (endpoint->reader_ == nullptr)
       return failure(ErrorCode::kInternal, "cannot create the reader of {}", Ros::kRequestTopic);
     return endpoint;

@@ -133,10 +133,9 @@ MatrixXd background_columns(const LinearProblem& problem, const std::vector<Unna
 }
 
 Status add_to(PriorModel& prior_model, const std::string& spec) {
-  Result<ErrorSourcePtr> source = make_error_source(spec, *prior_model.model.cell);
-  if (!source) return tl::make_unexpected(source.error());
-  const std::vector<Parameter> parameters = (*source)->parameters();
-  const Index first = add_source(prior_model.model, std::move(*source));
+  ErrorSourcePtr source = TRY(make_error_source(spec, *prior_model.model.cell));
+  const std::vector<Parameter> parameters = source->parameters();
+  const Index first = add_source(prior_model.model, std::move(source));
   prior_model.priors.insert(prior_model.priors.begin() + first, parameters.begin(), parameters.end());
   return {};
 }

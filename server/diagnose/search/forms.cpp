@@ -67,7 +67,7 @@ Result<bool> add_in_best_form(SearchResult& result, Accepted& one, const Accepte
   std::optional<PriorModel> best;
   for (const std::string& spelling : spellings(one.source, *start.model.cell)) {
     PriorModel extended = start;
-    if (const Status added = add_to(extended, spelling); !added) return tl::make_unexpected(added.error());
+    TRY(add_to(extended, spelling));
     refine(extended, result.batch, result.unnamed);
     const double square = held_out_square(extended, result.batch, result.unnamed, weight);
     if (square >= least) continue;

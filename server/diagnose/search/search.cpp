@@ -133,10 +133,9 @@ struct Search::Together {
 
 Status Search::start(const std::vector<std::string>& sources, const MeasurementBatch& batch) {
   result_.all = result_.batch = batch;
-  const Result<CalibrationResult> calibration = calibrate(cell_, sources, batch, {});
-  if (!calibration) return tl::make_unexpected(calibration.error());
+  const CalibrationResult calibration = TRY(calibrate(cell_, sources, batch, {}));
   own_sources_ = sources;
-  result_.before = {calibration->model, priors_of(*calibration)};
+  result_.before = {calibration.model, priors_of(calibration)};
   result_.after = result_.before;
   return {};
 }
@@ -153,7 +152,7 @@ Result<bool> Search::step() {
                   choice.seen.score[*best]);
     return true;
   }
-  if (const Status taken = take_named(standing, choice, *named); !taken) return tl::make_unexpected(taken.error());
+  TRY(take_named(standing, choice, *named));
   return true;
 }
 
@@ -340,9 +339,8 @@ void Search::take_outlier(const LinearProblem& problem, Accepted one) {
 Status Search::take_cause(Accepted one) {
   const auto poorer = known_map(one.cause);
   const bool is_known = poorer != result_.accepted.end();
-  const Result<bool> added = add_in_best_form(result_, one, is_known ? &*poorer : nullptr);
-  if (!added) return tl::make_unexpected(added.error());
-  if (!*added) {
+  const bool added = TRY(add_in_best_form(result_, one, is_known ? &*poorer : nullptr));
+  if (!added) {
     closed_.push_back(one.cause);
     return {};
   }
@@ -427,9 +425,8 @@ Status Search::reconsider() {
     const PriorModel with = result_.after;
     remove_from(result_.after, one.in_model);
     refine_all();
-    const Result<bool> named = name_again(one);
-    if (!named) return tl::make_unexpected(named.error());
-    if (!*named) result_.after = with;
+    const bool named = TRY(name_again(one));
+    if (!named) result_.after = with;
   }
   return {};
 }
@@ -586,20 +583,18 @@ SearchResult Search::take() {
 Result<SearchResult> search_causes(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
                                    const MeasurementBatch& batch, const DiagnoseOptions& options) {
   Search search(cell, options);
-  if (const Status started = search.start(sources, batch); !started) return tl::make_unexpected(started.error());
+  TRY(search.start(sources, batch));
   bool changed = true;
   for (int k = 0; k < kMostSteps && changed; ++k) {
-    const Status wanted = report_progress(options, "looking for causes", kShareOfWork * k / kMostSteps);
-    if (!wanted) return tl::make_unexpected(wanted.error());
-    const Result<bool> more = search.step();
-    if (!more) return tl::make_unexpected(more.error());
-    changed = *more || search.prune();
+    TRY(report_progress(options, "looking for causes", kShareOfWork * k / kMostSteps));
+    const bool more = TRY(search.step());
+    changed = more || search.prune();
     if (!changed || search.is_time_for_forms()) changed = search.choose_forms_again() || changed;
     if (!changed) changed = search.name_functions();
   }
   search.take_back_outliers();
-  if (const Status again = search.reconsider(); !again) return tl::make_unexpected(again.error());
-  if (const Status opened = search.open_wrong_signs(); !opened) return tl::make_unexpected(opened.error());
+  TRY(search.reconsider());
+  TRY(search.open_wrong_signs());
   return search.take();
 }
 

@@ -124,9 +124,8 @@ class Measuring {
 
   /// Evenly over the cell's ranges.
   Result<Candidates> pool() {
-    const Result<MatrixXd> planned = plan_poses(cell(), {.count = kPool, .seed = seed_});
-    if (!planned) return tl::make_unexpected(planned.error());
-    return measurable(*planned);
+    const MatrixXd planned = TRY(plan_poses(cell(), {.count = kPool, .seed = seed_}));
+    return measurable(planned);
   }
   /// `chosen` with one or two joints elsewhere: anywhere in their ranges, or as near to an end as they can be
   /// approached.

@@ -245,9 +245,8 @@ Result<CheckRows> check_rows(const CompensatedModel& model, const MeasurementBat
   const double shown = rotation_shown(parts);
   const bool has_orientation = std::any_of(batch.measurements.begin(), batch.measurements.end(),
                                            [&](const Measurement& m) { return m.R_WT && shown > 0; });
-  const Result<Stand> stand = base_of(batch, predictions, has_orientation, parts.physics.X_WB);
-  if (!stand) return tl::make_unexpected(stand.error());
-  const Pose& X_WB = stand->X_WB;
+  const Stand stand = TRY(base_of(batch, predictions, has_orientation, parts.physics.X_WB));
+  const Pose& X_WB = stand.X_WB;
   Index next = 0;
   for (const Measurement& m : batch.measurements) {
     rows.pose_ids.push_back(m.pose_id);
@@ -284,7 +283,7 @@ Result<CheckRows> check_rows(const CompensatedModel& model, const MeasurementBat
       covariance_of(rows, deviations, parts) + left_in_joints(rows, deviations, effects, parts.q_max - parts.q_min);
   const double factor = held_out_factor(rows, parts);
   rows.covariance *= factor * factor;
-  if (!stand->turns) hold_turn(rows);
+  if (!stand.turns) hold_turn(rows);
   return rows;
 }
 

@@ -223,14 +223,13 @@ Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect_to_one(const
 }
 
 Result<std::unique_ptr<PostgresDatabase>> PostgresDatabase::connect(const std::string& url, Session session) {
-  auto hosts = settings_of(url);
-  if (!hosts) return tl::make_unexpected(hosts.error());
-  std::shuffle(hosts->begin(), hosts->end(), std::mt19937_64(std::random_device{}()));
+  auto hosts = TRY(settings_of(url));
+  std::shuffle(hosts.begin(), hosts.end(), std::mt19937_64(std::random_device{}()));
   std::optional<Error> why;
   const auto keep = [&why](const Error& error) {
     if (!why || error.code == ErrorCode::kRefused) why = error;
   };
-  for (const PostgresSettings& host : *hosts) {
+  for (const PostgresSettings& host : hosts) {
     const auto places = with_addresses(host, kPerHost);
     if (!places) {
       keep(places.error());

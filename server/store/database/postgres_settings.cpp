@@ -84,10 +84,9 @@ Result<std::vector<PostgresSettings>> with_addresses(const PostgresSettings& hos
   const std::string name = value("host");
   const bool is_socket = name.empty() || name.front() == '/' || name.front() == '@';
   if (is_socket || !value("hostaddr").empty()) return std::vector<PostgresSettings>{host};
-  const auto addresses = addresses_of(name, limit);
-  if (!addresses) return tl::make_unexpected(addresses.error());
+  const auto addresses = TRY(addresses_of(name, limit));
   std::vector<PostgresSettings> each;
-  for (const std::string& address : *addresses) each.emplace_back(host).emplace_back("hostaddr", address);
+  for (const std::string& address : addresses) each.emplace_back(host).emplace_back("hostaddr", address);
   return each;
 }
 

@@ -126,38 +126,32 @@ void ModelHistory::set_trouble(const std::string& cell, const std::optional<Cell
 Result<CompensatedModel> ModelHistory::load_for_service(const std::string& cell, int version) const {
   auto model = store_.model(cell, version);
   if (!model) return model;
-  const Status fits =
-      check_fits_cell(*model, *cells_.now().at(cell), fmt::format("version {} of cell {}", version, cell));
-  if (!fits) return tl::make_unexpected(fits.error());
+  TRY(check_fits_cell(*model, *cells_.now().at(cell), fmt::format("version {} of cell {}", version, cell)));
   return model;
 }
 
 Status ModelHistory::activate(const std::string& cell, int version, const ChangeId& id,
                               const std::optional<GateVerdict>& judged) {
-  if (auto found = cells_.find(cell); !found) return tl::make_unexpected(found.error());
-  const auto made = store_.outcome_of(id);
-  if (!made) return tl::make_unexpected(made.error());
-  if (*made) return {};
-  auto model = registry_.version(cell, version);
-  if (!model) return tl::make_unexpected(model.error());
+  TRY(cells_.find(cell));
+  const auto made = TRY(store_.outcome_of(id));
+  if (made) return {};
+  auto model = TRY(registry_.version(cell, version));
   const MutexLock lock(changes_of(cell));
-  const auto made_meanwhile = store_.outcome_of(id);
-  if (!made_meanwhile) return tl::make_unexpected(made_meanwhile.error());
-  if (*made_meanwhile) return {};
+  const auto made_meanwhile = TRY(store_.outcome_of(id));
+  if (made_meanwhile) return {};
   const std::optional<JobOutcome> figures = judged ? std::optional(outcome_of(*judged)) : std::nullopt;
   if (auto activated = store_.activate(cell, version, id, figures); !activated) return activated;
-  if (registry_.version_in_force(cell) != version) put_in_force(std::move(*model));
+  if (registry_.version_in_force(cell) != version) put_in_force(std::move(model));
   return {};
 }
 
 Status ModelHistory::follow(const std::string& cell) {
   const MutexLock lock(changes_of(cell));  // what this server decides meanwhile is published before it is compared
-  const auto decided = store_.version_in_force(cell);
-  if (!decided) return tl::make_unexpected(decided.error());
-  if (!*decided || **decided == registry_.version_in_force(cell)) return {};
-  auto model = registry_.version(cell, **decided);
+  const auto decided = TRY(store_.version_in_force(cell));
+  if (!decided || *decided == registry_.version_in_force(cell)) return {};
+  auto model = registry_.version(cell, *decided);
   if (!model) {
-    registry_.announce(cell, **decided);  // whoever asks for it hears why it is not served
+    registry_.announce(cell, *decided);  // whoever asks for it hears why it is not served
     if (model.error().code == ErrorCode::kBusy) return tl::make_unexpected(model.error());
     return {};
   }
@@ -167,11 +161,9 @@ Status ModelHistory::follow(const std::string& cell) {
 }
 
 Result<ModelHistory::WayBack> ModelHistory::way_back(const std::string& cell) const {
-  auto before = store_.previous_in_force(cell);
-  if (!before) return tl::make_unexpected(before.error());
-  const auto now = store_.version_in_force(cell);
-  if (!now) return tl::make_unexpected(now.error());
-  return WayBack{now->value_or(0), std::move(*before)};
+  auto before = TRY(store_.previous_in_force(cell));
+  const auto now = TRY(store_.version_in_force(cell));
+  return WayBack{now.value_or(0), std::move(before)};
 }
 
 Result<std::pair<int, ServedModelPtr>> ModelHistory::load_first(const std::string& cell,
@@ -187,27 +179,24 @@ Result<std::pair<int, ServedModelPtr>> ModelHistory::load_first(const std::strin
 }
 
 Result<int> ModelHistory::rollback(const std::string& cell, const ChangeId& id) {
-  if (auto found = cells_.find(cell); !found) return tl::make_unexpected(found.error());
+  TRY(cells_.find(cell));
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
-    const auto made = store_.outcome_of(id);
-    if (!made) return tl::make_unexpected(made.error());
-    if (*made) return (*made)->version;
+    const auto made = TRY(store_.outcome_of(id));
+    if (made) return made->version;
     // Loading takes a while: nobody waits for it.
-    const auto way = way_back(cell);
-    if (!way) return tl::make_unexpected(way.error());
-    auto found = load_first(cell, way->before);
-    if (!found) return tl::make_unexpected(found.error());
+    const auto way = TRY(way_back(cell));
+    auto found = TRY(load_first(cell, way.before));
     const MutexLock lock(changes_of(cell));
-    if (const auto now = way_back(cell); !now || *now != *way) continue;
+    if (const auto now = way_back(cell); !now || *now != way) continue;
     ChangeId decided = id;
-    if (!decided.expected_version) decided.expected_version = way->version_now;
-    const auto restored = store_.rollback(cell, found->first, decided);
+    if (!decided.expected_version) decided.expected_version = way.version_now;
+    const auto restored = store_.rollback(cell, found.first, decided);
     const bool changed_elsewhere = !restored && restored.error().code == ErrorCode::kConflict && !id.expected_version;
     if (changed_elsewhere) continue;
     if (!restored) return restored;
     // Where others went away from this version and back meanwhile, the way back is another one.
-    if (found->second->version == *restored) {
-      put_in_force(std::move(found->second));
+    if (found.second->version == *restored) {
+      put_in_force(std::move(found.second));
     } else if (auto other = registry_.version(cell, *restored)) {
       put_in_force(std::move(*other));
     }
@@ -218,8 +207,7 @@ Result<int> ModelHistory::rollback(const std::string& cell, const ChangeId& id) 
 
 Result<CompensatedModel> ModelHistory::model_from(const std::string& cell, const std::string& text,
                                                   const char* what) const {
-  const auto served = cells_.find(cell);
-  if (!served) return tl::make_unexpected(served.error());
+  const auto served = TRY(cells_.find(cell));
   auto model = deserialize(text, what);
   if (!model) return model;
   const std::string& id = model->provenance().id;
@@ -228,22 +216,19 @@ Result<CompensatedModel> ModelHistory::model_from(const std::string& cell, const
         .of("cell")
         .with_text(model->cell().name);
   }
-  const Status fits = check_fits_cell(*model, **served, fmt::format("{} {}", what, id));
-  if (!fits) return tl::make_unexpected(fits.error());
+  TRY(check_fits_cell(*model, *served, fmt::format("{} {}", what, id)));
   return model;
 }
 
 Result<int> ModelHistory::import_model(const std::string& cell, const std::string& text, const ChangeId& id) {
-  const auto model = model_from(cell, text, "imported model");
-  if (!model) return tl::make_unexpected(model.error());
+  const auto model = TRY(model_from(cell, text, "imported model"));
   const MutexLock lock(changes_of(cell));
-  const auto present = store_.models(cell);
-  if (!present) return tl::make_unexpected(present.error());
-  for (const StoredModel& stored : *present) {
-    if (stored.hash == model->provenance().hash) return stored.version;
+  const auto present = TRY(store_.models(cell));
+  for (const StoredModel& stored : present) {
+    if (stored.hash == model.provenance().hash) return stored.version;
   }
-  const auto version = store_.add_model(cell, *model, 0, false, "", false, id);
-  if (version && listener_) listener_({cell, *version, *model}, false);
+  const auto version = store_.add_model(cell, model, 0, false, "", false, id);
+  if (version && listener_) listener_({cell, *version, model}, false);
   return version;
 }
 
@@ -264,16 +249,13 @@ GateVerdict ModelHistory::within_step_limit(GateVerdict verdict, const Candidate
 
 Result<ModelHistory::Judged> ModelHistory::judged(const Candidate& candidate, const Judging& judging,
                                                   const ServedModel* present) const {
-  const auto may_release = store_.may_release(candidate.job.id);
-  if (!may_release) return tl::make_unexpected(may_release.error());
-  const auto others = opponents(candidate.job.cell, present);
-  if (!others) return tl::make_unexpected(others.error());
-  const auto judged_by_poses = judging(*others);
-  if (!judged_by_poses) return tl::make_unexpected(judged_by_poses.error());
-  const std::optional<GateVerdict> verdict = within_step_limit(*judged_by_poses, candidate, present);
-  const bool released = *may_release && (verdict->put_in_force || verdict->undecided);
+  const auto may_release = TRY(store_.may_release(candidate.job.id));
+  const auto others = TRY(opponents(candidate.job.cell, present));
+  const auto judged_by_poses = TRY(judging(others));
+  const std::optional<GateVerdict> verdict = within_step_limit(judged_by_poses, candidate, present);
+  const bool released = may_release && (verdict->put_in_force || verdict->undecided);
   std::string message = verdict->message + candidate.remarks;
-  if (*may_release && !released)
+  if (may_release && !released)
     message += fmt::format("; what was in quarantine of {} stays there", fmt::join(candidate.job.batch_ids, ", "));
   JobOutcome outcome = outcome_of(*verdict);
   outcome.peak_memory = candidate.peak_memory;
@@ -286,26 +268,22 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate, const Judging& judgi
   for (int attempt = 0; attempt < kMostAttempts; ++attempt) {
     if (stop.stop_requested()) return failure(ErrorCode::kBusy, "the service stops");
     // Of the record, since what it has in force may be a version that cannot be loaded here.
-    const auto recorded = store_.version_in_force(cell);
-    if (!recorded) return tl::make_unexpected(recorded.error());
+    const auto recorded = TRY(store_.version_in_force(cell));
     if (store_.is_shared()) static_cast<void>(follow(cell));  // else the store refuses what was judged beside another
     // Judging takes a while: nobody waits for it. Where somebody changed what is in force meanwhile, it is done again.
     const auto present = registry_.in_force(cell);
     const int version = present ? present->version : 0;
-    auto found = judged(candidate, judging, present.get());
-    if (!found) return tl::make_unexpected(found.error());
+    auto found = TRY(judged(candidate, judging, present.get()));
     const MutexLock lock(changes_of(cell));
     if (registry_.version_in_force(cell) != version) continue;
-    auto kept = store(candidate, *found, recorded->value_or(0));
+    auto kept = store(candidate, found, recorded.value_or(0));
     const bool changed_elsewhere = !kept && kept.error().code == ErrorCode::kConflict;
     if (!changed_elsewhere) return kept;
   }
   const MutexLock lock(changes_of(cell));
-  const auto recorded = store_.version_in_force(cell);
-  if (!recorded) return tl::make_unexpected(recorded.error());
-  auto found = judged(candidate, judging, registry_.in_force(cell).get());
-  if (!found) return tl::make_unexpected(found.error());
-  return store(candidate, std::move(*found), recorded->value_or(0));
+  const auto recorded = TRY(store_.version_in_force(cell));
+  auto found = TRY(judged(candidate, judging, registry_.in_force(cell).get()));
+  return store(candidate, std::move(found), recorded.value_or(0));
 }
 
 Result<Kept> ModelHistory::store(const Candidate& candidate, Judged judged, int expected) {
@@ -313,16 +291,15 @@ Result<Kept> ModelHistory::store(const Candidate& candidate, Judged judged, int 
   ChangeId decided;
   // Of a store with one server the cell's lock says the same.
   if (judged.put_in_force && store_.is_shared()) decided.expected_version = expected;
-  const auto version = store_.add_model(cell, candidate.model, candidate.job.id, judged.put_in_force, judged.message,
-                                        judged.release, decided, judged.outcome);
-  if (!version) return tl::make_unexpected(version.error());
-  auto served = registry_.reclaimed({cell, *version, candidate.model});
+  const auto version = TRY(store_.add_model(cell, candidate.model, candidate.job.id, judged.put_in_force,
+                                            judged.message, judged.release, decided, judged.outcome));
+  auto served = registry_.reclaimed({cell, version, candidate.model});
   if (judged.put_in_force) {
     put_in_force(std::move(served));
   } else if (listener_) {
     listener_(*served, false);
   }
-  return Kept{*version, judged.put_in_force, std::move(judged.message), std::move(judged.outcome)};
+  return Kept{version, judged.put_in_force, std::move(judged.message), std::move(judged.outcome)};
 }
 
 void ModelHistory::put_in_force(ServedModelPtr model) {
@@ -338,12 +315,10 @@ Result<Opponents> ModelHistory::opponents(const std::string& cell, const ServedM
     auto text = store_.model_text(cell, present->version);
     opponents.in_force = ModelText{present->version, text ? std::move(*text) : serialize(present->model)};
   }
-  auto before = served_before(cell);
-  if (!before) return tl::make_unexpected(before.error());
-  opponents.served_before = std::move(*before);
-  const auto record = record_not_loaded(cell);
-  if (!record) return tl::make_unexpected(record.error());
-  opponents.record = *record;
+  auto before = TRY(served_before(cell));
+  opponents.served_before = std::move(before);
+  const auto record = TRY(record_not_loaded(cell));
+  opponents.record = record;
   return opponents;
 }
 
@@ -363,11 +338,10 @@ Result<std::vector<ModelText>> ModelHistory::served_before(const std::string& ce
 
 Result<std::optional<RecordInForce>> ModelHistory::record_not_loaded(const std::string& cell) const {
   if (registry_.in_force(cell)) return std::nullopt;
-  const auto models = store_.models(cell);
-  if (!models) return tl::make_unexpected(models.error());
-  const auto marked = std::find_if(models->begin(), models->end(), [](const StoredModel& m) { return m.in_force; });
+  const auto models = TRY(store_.models(cell));
+  const auto marked = std::find_if(models.begin(), models.end(), [](const StoredModel& m) { return m.in_force; });
   // One that can be loaded was set aside for its robot or tools: its figures say nothing about others.
-  if (marked == models->end() || store_.model(cell, marked->version)) return std::nullopt;
+  if (marked == models.end() || store_.model(cell, marked->version)) return std::nullopt;
   return RecordInForce{marked->version, marked->validation_rms};
 }
 

@@ -151,17 +151,15 @@ void Descriptor::close() {
 }
 
 Result<std::unique_ptr<ChildProcess>> ChildProcess::start(const std::vector<std::string>& argv) {
-  auto channel = socket_pair();
-  if (!channel) return tl::make_unexpected(channel.error());
-  auto words = pipe_of_words();
-  if (!words) return tl::make_unexpected(words.error());
+  auto channel = TRY(socket_pair());
+  auto words = TRY(pipe_of_words());
   std::unique_ptr<ChildProcess> child(new ChildProcess());
   pid_t pid = -1;
-  const int error = SpawnPlan(channel->second.get(), words->second.get()).start(argv, pid);
+  const int error = SpawnPlan(channel.second.get(), words.second.get()).start(argv, pid);
   if (error != 0) return failed(argv.front().c_str(), error);
   child->pid_ = pid;
-  child->channel_ = std::move(channel->first);
-  child->words_ = std::move(words->first);
+  child->channel_ = std::move(channel.first);
+  child->words_ = std::move(words.first);
   child->pidfd_ = Descriptor(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)));
   if (child->pidfd_.get() < 0) return failed("pidfd_open", errno);
   return child;

@@ -83,9 +83,8 @@ Result<std::unique_ptr<ComputeProcess>> ComputeProcess::start(const ComputeOptio
   std::vector<std::string> argv = options.program;
   for (const std::int64_t limit : {std::int64_t{::getpid()}, memory_mb_of(options), std::int64_t{options.cpu_s}})
     argv.push_back(std::to_string(limit));
-  auto child = ChildProcess::start(argv);
-  if (!child) return tl::make_unexpected(child.error());
-  std::unique_ptr<ComputeProcess> process(new ComputeProcess(options, std::move(*child), stop));
+  auto child = TRY(ChildProcess::start(argv));
+  std::unique_ptr<ComputeProcess> process(new ComputeProcess(options, std::move(child), stop));
   for (const Frame& frame : message::of_task(task)) {
     if (!process->send(frame)) break;  // make() says why
   }
@@ -95,11 +94,10 @@ Result<std::unique_ptr<ComputeProcess>> ComputeProcess::start(const ComputeOptio
 Status ComputeProcess::take(const BatchText& batch, bool judges) { return send(message::of_batch(batch, judges)); }
 
 Result<Made> ComputeProcess::make(const ComputeWatch& watch) {
-  if (const Status sent = send(message::make()); !sent) return tl::make_unexpected(sent.error());
-  const auto frame = answer(watch);
-  if (!frame) return tl::make_unexpected(frame.error());
+  TRY(send(message::make()));
+  const auto frame = TRY(answer(watch));
   try {
-    return message::to_made(*frame);
+    return message::to_made(frame);
   } catch (const nlohmann::json::exception& error) {
     return broken(Breakdown::Kind::kCrashed, failure(ErrorCode::kInternal, "not understood: {}", error.what()));
   }
@@ -107,12 +105,11 @@ Result<Made> ComputeProcess::make(const ComputeWatch& watch) {
 
 Result<GateVerdict> ComputeProcess::judge(const Opponents& opponents) {
   for (const Frame& frame : message::of_opponents(opponents)) {
-    if (const Status sent = send(frame); !sent) return tl::make_unexpected(sent.error());
+    TRY(send(frame));
   }
-  const auto frame = answer({});
-  if (!frame) return tl::make_unexpected(frame.error());
+  const auto frame = TRY(answer({}));
   try {
-    return message::to_verdict(*frame);
+    return message::to_verdict(frame);
   } catch (const nlohmann::json::exception& error) {
     return broken(Breakdown::Kind::kCrashed, failure(ErrorCode::kInternal, "not understood: {}", error.what()));
   }
@@ -147,13 +144,13 @@ Result<Frame> ComputeProcess::answer(const ComputeWatch& watch) {
     auto frame = reader_.next();
     if (!frame) return broken(Breakdown::Kind::kCrashed, Failure(frame.error()));
     if (!*frame) {
-      if (const Status ready = wait(POLLIN); !ready) return tl::make_unexpected(ready.error());
-      if (const Status received = receive(); !received) return tl::make_unexpected(received.error());
+      TRY(wait(POLLIN));
+      TRY(receive());
       continue;
     }
     const std::string kind = message::kind_of(**frame);
     if (kind == "made" || kind == "verdict") return std::move(**frame);
-    if (const Status status = heard(**frame, watch); !status) return tl::make_unexpected(status.error());
+    TRY(heard(**frame, watch));
   }
 }
 

@@ -18,7 +18,7 @@ using Sizes = std::array<std::uint64_t, 2>;  // of head and text
 Result<nlohmann::json> head_of(const std::string& text) {
   JsonLimits limits;
   limits.depth = 8;
-  if (const Status fits = check_json_limits(text, kWhere, limits); !fits) return tl::make_unexpected(fits.error());
+  TRY(check_json_limits(text, kWhere, limits));
   nlohmann::json head = nlohmann::json::parse(text, nullptr, false);
   if (!head.is_object()) return failure(ErrorCode::kInternal, "not a JSON object").in(kWhere);
   return head;
@@ -46,9 +46,8 @@ Result<std::optional<Frame>> FrameReader::next() {
   }
   const std::size_t whole = sizeof(Sizes) + head_bytes + text_bytes;
   if (buffer_.size() < whole) return std::nullopt;
-  auto head = head_of(buffer_.substr(sizeof(Sizes), head_bytes));
-  if (!head) return tl::make_unexpected(head.error());
-  Frame frame{std::move(*head), buffer_.substr(sizeof(Sizes) + head_bytes, text_bytes)};
+  auto head = TRY(head_of(buffer_.substr(sizeof(Sizes), head_bytes)));
+  Frame frame{std::move(head), buffer_.substr(sizeof(Sizes) + head_bytes, text_bytes)};
   buffer_.erase(0, whole);
   return frame;
 }

@@ -21,12 +21,10 @@ HoldOut held_out_of_diagnosis(double validation_share, std::uint64_t seed, bool 
 
 Result<CheckedBatch> received_batch(const BatchText& text, const Cell& cell, const HoldOut& hold_out) {
   const std::string id = text.id.empty() ? "sent-" + sha256_hex(text.csv).substr(0, kIdOfSentBatch) : text.id;
-  auto parsed = parse_batch(text.csv, "batch " + id);
-  if (!parsed) return tl::make_unexpected(parsed.error());
-  parsed->id = id;
-  if (const Status positions = require_positions(*parsed, "the service"); !positions)
-    return tl::make_unexpected(positions.error());
-  return check_against_cell(dated(std::move(*parsed), text.taken_in), cell, hold_out);
+  auto parsed = TRY(parse_batch(text.csv, "batch " + id));
+  parsed.id = id;
+  TRY(require_positions(parsed, "the service"));
+  return check_against_cell(dated(std::move(parsed), text.taken_in), cell, hold_out);
 }
 
 JobBatches::JobBatches(const Cell& cell, HoldOut hold_out, std::vector<std::string> own,
@@ -73,15 +71,14 @@ const std::vector<JudgingSession>& JobBatches::judging_sessions() {
 
 Result<JobBatches::SessionsOfDiagnosis> JobBatches::sessions_of_diagnosis() {
   std::vector<JudgingSession> sessions = judging_sessions();
-  const auto batch = first();
-  if (!batch) return tl::make_unexpected(batch.error());
+  const auto batch = TRY(first());
   const auto own = std::find_if(sessions.begin(), sessions.end(), [&](const JudgingSession& session) {
-    return !own_ids_.empty() && session.batch_id == batch->id();
+    return !own_ids_.empty() && session.batch_id == batch.id();
   });
   const auto place = static_cast<std::size_t>(own - sessions.begin());
   if (own == sessions.end()) {
     // It came with the question and is not stored, or is older than those that judge.
-    sessions.push_back(judging_session(*batch));
+    sessions.push_back(judging_session(batch));
     judge_once(sessions);
   }
   return SessionsOfDiagnosis{std::move(sessions), place};

@@ -112,10 +112,9 @@ std::vector<Frame> of_task(const ComputeTask& task) {
 
 Result<ComputeTask> to_task(const Frame& frame, TaskTexts texts) {
   const Json& head = frame.head;
-  auto cell = parse_cell(texts.cell, texts.robot, "cell " + head.at("cell").get<std::string>());
-  if (!cell) return tl::make_unexpected(cell.error());
+  auto cell = TRY(parse_cell(texts.cell, texts.robot, "cell " + head.at("cell").get<std::string>()));
   ComputeTask task;
-  task.cell = std::make_shared<const Cell>(std::move(*cell));
+  task.cell = std::make_shared<const Cell>(std::move(cell));
   task.kind = head.at("diagnose").get<bool>() ? JobKind::kDiagnose
               : head.at("check").get<bool>()  ? JobKind::kCheck
                                               : JobKind::kTrain;
@@ -201,9 +200,8 @@ Result<Made> to_made(const Frame& frame) {
   made.outcome.verdict = job_verdict_of(frame.head.at("verdict").get<std::string>()).value_or(JobVerdict::kOpen);
   made.outcome.why = frame.head.at("why");
   if (frame.text.empty()) return made;
-  auto model = deserialize(frame.text, "the model that was made", ModelTexts::kAsTheyAre);
-  if (!model) return tl::make_unexpected(model.error());
-  made.model = std::move(*model);
+  auto model = TRY(deserialize(frame.text, "the model that was made", ModelTexts::kAsTheyAre));
+  made.model = std::move(model);
   return made;
 }
 

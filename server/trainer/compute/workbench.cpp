@@ -113,74 +113,62 @@ Result<Made> Workbench::make(const ComputeWatch& watch) {
 }
 
 Result<Made> Workbench::trained(const ComputeWatch& watch) {
-  const auto in_force = this->in_force();
-  if (!in_force) return tl::make_unexpected(in_force.error());
+  const auto in_force = TRY(this->in_force());
   std::string seen;
   bool changed = false;
   if (task_.hold_against_in_force) {
-    const auto batch = batches_.first();
-    if (!batch) return tl::make_unexpected(batch.error());
-    if (!*in_force) {
-      if (const auto doubt = doubt_of_first_batch(task_.cell, *batch)) return Made{std::nullopt, "", sentence(*doubt)};
+    const auto batch = TRY(batches_.first());
+    if (!in_force) {
+      if (const auto doubt = doubt_of_first_batch(task_.cell, batch)) return Made{std::nullopt, "", sentence(*doubt)};
     }
-    if (*in_force) {
-      const Triage triaged = triage((*in_force)->model, *batch);
+    if (in_force) {
+      const Triage triaged = triage(in_force->model, batch);
       if (!triaged.learn) return Made{std::nullopt, "", triaged.sentence};
       changed = triaged.verdict != TriageVerdict::kClean;
       if (changed) seen = "the batch: " + triaged.sentence;
     }
   }
-  const auto batch = batches_.to_learn_from();
-  if (!batch) return tl::make_unexpected(batch.error());
+  const auto batch = TRY(batches_.to_learn_from());
   const bool as_usual = task_.level.empty() && task_.bias.empty();
   auto successor =
-      train_successor(task_.cell, *batch, as_usual ? in_force->get() : nullptr, train_options(*batch, watch));
-  if (!successor) return tl::make_unexpected(successor.error());
+      TRY(train_successor(task_.cell, batch, as_usual ? in_force.get() : nullptr, train_options(batch, watch)));
   if (!task_.earlier_ids.empty()) {
-    if (const Status chosen = choose_alone(*successor, changed, watch); !chosen)
-      return tl::make_unexpected(chosen.error());
+    TRY(choose_alone(successor, changed, watch));
   }
-  return made(std::move(successor->model), joined_by_semicolons({seen, successor->note}), batches_.judging_sessions());
+  return made(std::move(successor.model), joined_by_semicolons({seen, successor.note}), batches_.judging_sessions());
 }
 
 Result<Made> Workbench::checked(const ComputeWatch& watch) {
-  const auto batch = batches_.first();
-  if (!batch) return tl::make_unexpected(batch.error());
-  const auto present = in_force();
-  if (!present) return tl::make_unexpected(present.error());
-  if (!*present) return failure(ErrorCode::kNotFound, "the cell has no model in force to hold a check against");
-  const auto rules = rules_of(*task_.cell);
-  if (!rules) return tl::make_unexpected(rules.error());
+  const auto batch = TRY(batches_.first());
+  const auto present = TRY(in_force());
+  if (!present) return failure(ErrorCode::kNotFound, "the cell has no model in force to hold a check against");
+  const auto rules = TRY(rules_of(*task_.cell));
   HealthOptions options;
-  options.tolerance = rules->tolerance.value_or(kUsualTolerance);
+  options.tolerance = rules.tolerance.value_or(kUsualTolerance);
   if (!task_.level.empty()) options.tolerance = std::stod(task_.level) * from_mm(1);
   for (const std::string& earlier : task_.earlier_checks) {
     if (auto drift = drift_of(earlier)) options.earlier.push_back(std::move(*drift));
   }
-  const auto health = check_health((*present)->model, *batch, options);
-  if (!health) return tl::make_unexpected(health.error());
-  const auto& rows = batch->rows().measurements;
-  const auto json = health_json(*health, {batch->id(), rows.empty() ? "" : rows.front().pose_id});
-  const Status stored =
-      watch.found(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n", "");
-  if (!stored) return tl::make_unexpected(stored.error());
+  const auto health = TRY(check_health(present->model, batch, options));
+  const auto& rows = batch.rows().measurements;
+  const auto json = health_json(health, {batch.id(), rows.empty() ? "" : rows.front().pose_id});
+  TRY(watch.found(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n", ""));
   Made made;
   made.outcome.verdict = JobVerdict::kDiagnosed;
-  made.outcome.why = health->sentence;
-  made.message = to_string(health->verdict);
+  made.outcome.why = health.sentence;
+  made.message = to_string(health.verdict);
   return made;
 }
 
 Status Workbench::choose_alone(Successor& together, bool changed, const ComputeWatch& watch) {
-  const auto own = batches_.first_without_older_judges();
-  if (!own) return tl::make_unexpected(own.error());
-  const bool adds_tools = in_force_ && has_unknown_tools(in_force_->model, own->rows());
+  const auto own = TRY(batches_.first_without_older_judges());
+  const bool adds_tools = in_force_ && has_unknown_tools(in_force_->model, own.rows());
   if (!changed && !adds_tools) return {};
-  auto alone = train_successor(task_.cell, *own, in_force_.get(), train_options(*own, watch));
+  auto alone = train_successor(task_.cell, own, in_force_.get(), train_options(own, watch));
   if (!alone) return {};  // too little by itself
   const std::vector<JudgingSession>& sessions = batches_.judging_sessions();
   const auto session = std::find_if(sessions.begin(), sessions.end(),
-                                    [&](const JudgingSession& one) { return one.batch_id == own->id(); });
+                                    [&](const JudgingSession& one) { return one.batch_id == own.id(); });
   const char* why = nullptr;
   if (changed && session != sessions.end() && is_better_on({*session}, together.model, alone->model)) {
     why = "the arm has changed in more than one way: learned from this batch alone";
@@ -197,38 +185,35 @@ Status Workbench::choose_alone(Successor& together, bool changed, const ComputeW
 
 Result<Made> Workbench::diagnosed(const ComputeWatch& watch) {
   // What is to judge an extended model must not have been looked at.
-  const auto batch = task_.apply ? batches_.first_without_older_judges() : batches_.first();
-  if (!batch) return tl::make_unexpected(batch.error());
-  const auto present = in_force();
-  if (!present) return tl::make_unexpected(present.error());
-  if (task_.apply && task_.batch_ids.empty() && *present) {
+  const auto batch = TRY(task_.apply ? batches_.first_without_older_judges() : batches_.first());
+  const auto present = TRY(in_force());
+  if (task_.apply && task_.batch_ids.empty() && present) {
     // What was sent with the question goes through the same door as what is submitted.
-    const Triage triaged = triage((*present)->model, *batch);
-    if (!triaged.learn) return nothing_applied(triaged.sentence, **present);
+    const Triage triaged = triage(present->model, batch);
+    if (!triaged.learn) return nothing_applied(triaged.sentence, *present);
   }
   DiagnoseOptions options;
   options.seed = task_.seed;
   options.progress = [&watch, whole = task_.apply ? kDiagnosisShare : 1](const std::string& stage, double share) {
     return watch.progress("diagnosing: " + stage, whole * share);
   };
-  const auto served = as_served(task_.cell, present->get(), *batch);
-  const auto diagnosis = trammel::diagnose(served, *batch, options);
-  if (!diagnosis) return tl::make_unexpected(with_rows_set_aside(diagnosis.error(), *batch));
-  const Status stored = watch.found(findings_text(*diagnosis), diagnosis_page(*diagnosis, *served));
-  if (!stored) return tl::make_unexpected(stored.error());
+  const auto served = as_served(task_.cell, present.get(), batch);
+  const auto diagnosis = trammel::diagnose(served, batch, options);
+  if (!diagnosis) return tl::make_unexpected(with_rows_set_aside(diagnosis.error(), batch));
+  TRY(watch.found(findings_text(*diagnosis), diagnosis_page(*diagnosis, *served)));
   Made made;
   made.outcome.verdict = JobVerdict::kDiagnosed;
   made.outcome.why = diagnosis->sentence;
   made.message = to_string(diagnosis->verdict);
   if (!task_.apply) return made;
   if (const Status can_apply = check_can_extend(*diagnosis); !can_apply) {
-    const std::string stays = *present ? fmt::format("; version {} stays in force", (*present)->version) : "";
+    const std::string stays = present ? fmt::format("; version {} stays in force", present->version) : "";
     made.outcome.verdict = JobVerdict::kNothingApplied;
     made.outcome.why = sentence(can_apply.error());
     made.message = "nothing applied: " + made.outcome.why + stays;
     return made;
   }
-  return extended(*batch, served->model.error_sources, *diagnosis, watch);
+  return extended(batch, served->model.error_sources, *diagnosis, watch);
 }
 
 Result<Made> Workbench::extended(const CheckedBatch& batch, const std::vector<std::string>& own,
@@ -237,28 +222,25 @@ Result<Made> Workbench::extended(const CheckedBatch& batch, const std::vector<st
   options.progress = [&watch](const std::string& stage, double share) {
     return watch.progress(stage, kDiagnosisShare + (1 - kDiagnosisShare) * share);
   };
-  auto extended = extended_model(task_.cell, own, batch, diagnosis, options);
-  if (!extended) return tl::make_unexpected(extended.error());
-  if (extended->day && !extended->day->carries()) {
+  auto extended = TRY(extended_model(task_.cell, own, batch, diagnosis, options));
+  if (extended.day && !extended.day->carries()) {
     Made made;
     made.outcome.verdict = JobVerdict::kNothingApplied;
-    made.outcome.why = to_string(*extended->day);
+    made.outcome.why = to_string(*extended.day);
     made.message = "nothing applied: " + made.outcome.why;
     return made;
   }
   if (!in_force_) {
-    auto without = model_without(task_.cell, own, batch, options);
-    if (!without) return tl::make_unexpected(without.error());
-    without_ = std::make_shared<const ServedModel>(task_.cell->name, 0, std::move(*without));
+    auto without = TRY(model_without(task_.cell, own, batch, options));
+    without_ = std::make_shared<const ServedModel>(task_.cell->name, 0, std::move(without));
   }
-  auto found = batches_.sessions_of_diagnosis();
-  if (!found) return tl::make_unexpected(found.error());
-  MeasurementBatch& own_judges = found->sessions[found->own].judges;
+  auto found = TRY(batches_.sessions_of_diagnosis());
+  MeasurementBatch& own_judges = found.sessions[found.own].judges;
   Judges judges = judges_of(diagnosis, std::move(own_judges));
   own_judges = std::move(judges.batch);
-  const std::string remarks = judged_without(judges.left_out) + joined_by_semicolons({to_string(extended->left_out)}) +
-                              (extended->day ? joined_by_semicolons({to_string(*extended->day)}) : "");
-  return made(std::move(extended->model), remarks, std::move(found->sessions));
+  const std::string remarks = judged_without(judges.left_out) + joined_by_semicolons({to_string(extended.left_out)}) +
+                              (extended.day ? joined_by_semicolons({to_string(*extended.day)}) : "");
+  return made(std::move(extended.model), remarks, std::move(found.sessions));
 }
 
 TrainOptions Workbench::train_options(const CheckedBatch& batch, const ComputeWatch& watch) const {
@@ -292,9 +274,8 @@ Result<GateVerdict> Workbench::judge(const Opponents& opponents) {
   if (opponents.in_force && in_force_ && in_force_->version == opponents.in_force->version) {
     present = in_force_;
   } else if (opponents.in_force) {
-    auto model = loaded(*opponents.in_force);
-    if (!model) return tl::make_unexpected(model.error());
-    present = std::make_shared<const ServedModel>(std::move(*model));
+    auto model = TRY(loaded(*opponents.in_force));
+    present = std::make_shared<const ServedModel>(std::move(model));
   }
   // The first model of its cell is held against the same without what was found, as on files.
   if (!opponents.in_force && !opponents.record) present = without_;
@@ -310,18 +291,16 @@ Result<GateVerdict> Workbench::judge(const Opponents& opponents) {
 
 Result<std::shared_ptr<const ServedModel>> Workbench::in_force() {
   if (!task_.in_force || in_force_) return in_force_;
-  auto model = loaded(*task_.in_force);
-  if (!model) return tl::make_unexpected(model.error());
-  in_force_ = std::make_shared<const ServedModel>(std::move(*model));
+  auto model = TRY(loaded(*task_.in_force));
+  in_force_ = std::make_shared<const ServedModel>(std::move(model));
   return in_force_;
 }
 
 Result<ServedModel> Workbench::loaded(const ModelText& text) const {
   const std::string which = fmt::format("version {} of cell {}", text.version, task_.cell->name);
-  auto model = deserialize(text.text, which, ModelTexts::kAsTheyAre);
-  if (!model) return tl::make_unexpected(model.error());
-  if (const Status fits = check_fits_cell(*model, *task_.cell, which); !fits) return tl::make_unexpected(fits.error());
-  return ServedModel{task_.cell->name, text.version, std::move(*model)};
+  auto model = TRY(deserialize(text.text, which, ModelTexts::kAsTheyAre));
+  TRY(check_fits_cell(model, *task_.cell, which));
+  return ServedModel{task_.cell->name, text.version, std::move(model)};
 }
 
 }  // namespace trammel

@@ -77,10 +77,9 @@ Result<CalibrationResult> calibrated(const std::shared_ptr<const Cell>& cell, co
                                      const MeasurementBatch& batch, const std::vector<FleetParameter>& priors) {
   std::optional<CalibrationResult> best;
   for (const std::vector<std::string>& forms : forms_of(sources, *cell)) {
-    Result<PhysicalModel> model = make_physical_model(cell, forms);
-    if (!model) return tl::make_unexpected(model.error());
-    expect(*model, priors);
-    Result<CalibrationResult> result = calibrate({std::move(*model), batch}, {});
+    PhysicalModel model = TRY(make_physical_model(cell, forms));
+    expect(model, priors);
+    Result<CalibrationResult> result = calibrate({std::move(model), batch}, {});
     if (!result) return result;
     if (!best || result->log_likelihood > best->log_likelihood) best = std::move(*result);
   }

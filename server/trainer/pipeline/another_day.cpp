@@ -100,11 +100,10 @@ Result<Matrix3Xd> left_of(const PhysicalModel& model, const MeasurementBatch& bl
     measured.col(i) = m.p_W;
     predicted.col(i) = model.pose_W(as_served(m.context)).translation();
   }
-  const Result<Pose> X = fit_transform(predicted, measured);
-  if (!X) return tl::make_unexpected(X.error());
+  const Pose X = TRY(fit_transform(predicted, measured));
   const double numbers = 3 * static_cast<double>(n);
   return Matrix3Xd(std::sqrt(numbers / (numbers - kPlace)) *
-                   (((X->linear() * measured).colwise() + X->translation()) - predicted));
+                   (((X.linear() * measured).colwise() + X.translation()) - predicted));
 }
 
 }  // namespace
@@ -172,12 +171,10 @@ std::optional<AnotherDay> AnotherDay::make(const std::shared_ptr<const Cell>& ce
 Result<Matrix3Xd> AnotherDay::left_by(const std::vector<std::string>& sources) const {
   Matrix3Xd all(3, 0);
   for (const Fold& fold : folds_) {
-    const auto model = identified(cell_, sources, fold.train);
-    if (!model) return tl::make_unexpected(model.error());
-    const Result<Matrix3Xd> left = left_of(model->model, fold.judges);
-    if (!left) return tl::make_unexpected(left.error());
-    Matrix3Xd longer(3, all.cols() + left->cols());
-    longer << all, *left;
+    const auto model = TRY(identified(cell_, sources, fold.train));
+    const Matrix3Xd left = TRY(left_of(model.model, fold.judges));
+    Matrix3Xd longer(3, all.cols() + left.cols());
+    longer << all, left;
     all = std::move(longer);
   }
   return all;

@@ -55,13 +55,12 @@ std::optional<BiasProblem> rotation_problem(const PhysicalModel& physics, const 
 /// The bias that is worth it, with the physics identified anew where observations are left out.
 Result<std::optional<BiasModel>> chosen_bias(CompensatedModel::Parts& parts, const BiasProblem& problem,
                                              const BiasOptions& options, const LeftOut& left_out) {
-  Result<ChosenBias> chosen = choose_bias(problem, options, [&](const std::vector<Eigen::Index>& observations) {
+  ChosenBias chosen = TRY(choose_bias(problem, options, [&](const std::vector<Eigen::Index>& observations) {
     const auto without = left_out.without(observations);
     return without ? std::optional(without->residual_B) : std::nullopt;
-  });
-  if (!chosen) return tl::make_unexpected(chosen.error());
-  parts.bias_choice = std::move(chosen->choice);
-  return std::move(chosen->model);
+  }));
+  parts.bias_choice = std::move(chosen.choice);
+  return std::move(chosen.model);
 }
 
 /// The orientation by a process of its own, of the same kernel: what is learned of the positions stays what it is.
@@ -74,13 +73,12 @@ Status add_rotation_bias(CompensatedModel::Parts& parts, const MeasurementBatch&
                                                           [](const Measurement& m) { return m.R_WT.has_value(); }));
     return {};
   }
-  const Result<BiasModel> learned = BiasModel::fit(*rotation, options);
-  if (!learned) return tl::make_unexpected(learned.error());
-  if (parts.bias_choice && !is_worth_it(*rotation, *learned)) {
+  const BiasModel learned = TRY(BiasModel::fit(*rotation, options));
+  if (parts.bias_choice && !is_worth_it(*rotation, learned)) {
     parts.bias_choice->sentence += "; of the orientations it explains nothing beyond chance and corrects none";
     return {};
   }
-  parts.rotation_bias = learned->state();
+  parts.rotation_bias = learned.state();
   parts.rotation_bias->features.clear();
   return {};
 }
@@ -115,16 +113,13 @@ Result<Learned> learned_bias(CompensatedModel::Parts& parts, const MeasurementBa
                              const BiasOptions& options) {
   if (options.kernel == kAutoBias) {
     BiasProblem problem = problem_of(parts, batch, true);
-    Result<std::optional<BiasModel>> chosen = chosen_bias(parts, problem, options, left_out);
-    if (!chosen) return tl::make_unexpected(chosen.error());
-    return Learned{std::move(problem), std::move(*chosen)};
+    std::optional<BiasModel> chosen = TRY(chosen_bias(parts, problem, options, left_out));
+    return Learned{std::move(problem), std::move(chosen)};
   }
-  const Result<SpelledBias> spelled = spelled_bias(options.kernel);
-  if (!spelled) return tl::make_unexpected(spelled.error());
-  BiasProblem problem = problem_of(parts, batch, spelled->needs_features());
-  Result<BiasModel> fitted = BiasModel::fit(problem, options);
-  if (!fitted) return tl::make_unexpected(fitted.error());
-  return Learned{std::move(problem), std::move(*fitted)};
+  const SpelledBias spelled = TRY(spelled_bias(options.kernel));
+  BiasProblem problem = problem_of(parts, batch, spelled.needs_features());
+  BiasModel fitted = TRY(BiasModel::fit(problem, options));
+  return Learned{std::move(problem), std::move(fitted)};
 }
 
 /// What came before a pose is long, and few sources ask for it.
@@ -174,15 +169,14 @@ Status add_bias(CompensatedModel::Parts& parts, const MeasurementBatch& all, con
   options.kernel = kernel;
   options.seed = seed;
   options.progress = [&](double share) { return progress(0.6 * share); };
-  const Result<Learned> learned = learned_bias(parts, batch, left_out, options);
-  if (!learned) return tl::make_unexpected(learned.error());
-  if (!learned->bias) return {};
-  take_over(parts, *learned->bias, batch, left_out);
-  parts.bias_spread = bias_spread(learned->problem, *learned->bias, left_out, seed,
+  const Learned learned = TRY(learned_bias(parts, batch, left_out, options));
+  if (!learned.bias) return {};
+  take_over(parts, *learned.bias, batch, left_out);
+  parts.bias_spread = bias_spread(learned.problem, *learned.bias, left_out, seed,
                                   [&](double share) { return progress(0.6 + 0.2 * share); });
-  options.kernel = without_flange(learned->bias->state().kernel);
+  options.kernel = without_flange(learned.bias->state().kernel);
   options.progress = [&](double share) { return progress(0.8 + 0.2 * share); };
-  return add_rotation_bias(parts, batch, learned->problem, options);
+  return add_rotation_bias(parts, batch, learned.problem, options);
 }
 
 }  // namespace trammel

@@ -101,23 +101,22 @@ std::vector<std::string> added_sources(const std::vector<std::string>& own, cons
 Result<ExtendedModel> extended_model(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& own,
                                      const CheckedBatch& batch, const Diagnosis& diagnosis,
                                      const TrainOptions& options) {
-  if (const Status allowed = check_can_extend(diagnosis); !allowed) return tl::make_unexpected(allowed.error());
+  TRY(check_can_extend(diagnosis));
   if (batch.held_out().measurements.empty())
     return refused("no rows are held out to judge an extended model by")
         .in("batch " + batch.id())
         .of("set")
         .beyond(0, 1);
-  Result<Supported> supported = supported_by(
-      cell, own, added_sources(own, diagnosis), batch.training(), judges_of(diagnosis, batch.held_out()).batch,
-      [&options](double share) {
-        return !options.progress || options.progress("asking of each cause what it is worth", kSupportShare * share);
-      });
-  if (!supported) return tl::make_unexpected(supported.error());
-  std::optional<DayGain> day = carry(cell, own, batch, diagnosis, *supported);
-  std::vector<std::string> sources = joined(own, supported->sources);
-  auto model = trained(cell, batch, sources, as_part(options, kSupportShare, 1));
-  if (!model) return tl::make_unexpected(model.error());
-  return ExtendedModel{std::move(*model), std::move(sources), std::move(supported->left_out), std::move(day)};
+  Supported supported =
+      TRY(supported_by(cell, own, added_sources(own, diagnosis), batch.training(),
+                       judges_of(diagnosis, batch.held_out()).batch, [&options](double share) {
+                         return !options.progress ||
+                                options.progress("asking of each cause what it is worth", kSupportShare * share);
+                       }));
+  std::optional<DayGain> day = carry(cell, own, batch, diagnosis, supported);
+  std::vector<std::string> sources = joined(own, supported.sources);
+  auto model = TRY(trained(cell, batch, sources, as_part(options, kSupportShare, 1)));
+  return ExtendedModel{std::move(model), std::move(sources), std::move(supported.left_out), std::move(day)};
 }
 
 Judges judges_of(const Diagnosis& diagnosis, MeasurementBatch held_out) {
@@ -140,20 +139,18 @@ Judges judges_of(const Diagnosis& diagnosis, MeasurementBatch held_out) {
 Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch, const Diagnosis& diagnosis,
                          const TrainOptions& options) {
   const std::vector<std::string>& own = cell->model.error_sources;
-  auto after = extended_model(cell, own, batch, diagnosis, as_part(options, 0, kExtendedShare));
-  if (!after) return tl::make_unexpected(after.error());
-  auto before = trained(cell, batch, own, as_part(options, kExtendedShare, 1));
-  if (!before) return tl::make_unexpected(before.error());
+  auto after = TRY(extended_model(cell, own, batch, diagnosis, as_part(options, 0, kExtendedShare)));
+  auto before = TRY(trained(cell, batch, own, as_part(options, kExtendedShare, 1)));
   Judges judges = judges_of(diagnosis, batch.held_out());
-  PairedGain gain = paired_gain(*before, after->model, judges.batch);
+  PairedGain gain = paired_gain(before, after.model, judges.batch);
   gain.left_out = std::move(judges.left_out);
-  const ServedModel present(cell->name, 0, *before);
+  const ServedModel present(cell->name, 0, before);
   GateVerdict verdict =
-      verdict_on(after->model, &present, {}, std::nullopt, {{batch.id(), batch.training(), std::move(judges.batch)}},
+      verdict_on(after.model, &present, {}, std::nullopt, {{batch.id(), batch.training(), std::move(judges.batch)}},
                  {.bar = Bar::kBetterBeyondChance});
-  std::vector<std::string> lasting = lasting_sources(after->sources);
-  return Extension{std::move(after->sources), std::move(lasting), std::move(*before),         std::move(after->model),
-                   std::move(gain),           std::move(verdict), std::move(after->left_out), std::move(after->day)};
+  std::vector<std::string> lasting = lasting_sources(after.sources);
+  return Extension{std::move(after.sources), std::move(lasting), std::move(before),         std::move(after.model),
+                   std::move(gain),          std::move(verdict), std::move(after.left_out), std::move(after.day)};
 }
 
 Result<Applied> applied(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch, const Diagnosis& diagnosis,

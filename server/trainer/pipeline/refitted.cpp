@@ -101,14 +101,13 @@ struct BiasAt {
 Result<BiasAt> bias_at(CompensatedModel::Parts parts, const MeasurementBatch& poses) {
   parts.covariance.setZero();
   if (parts.bias_origin) parts.bias_origin->covariance.setZero();
-  const Result<CompensatedModel> model = CompensatedModel::make(std::move(parts));
-  if (!model) return tl::make_unexpected(model.error());
-  const PhysicalModel& physics = model->parts().physics;
+  const CompensatedModel model = TRY(CompensatedModel::make(std::move(parts)));
+  const PhysicalModel& physics = model.parts().physics;
   const double tracker = physics.cell->tracker.sigma;
   const Matrix3 R_AB = served_base(physics).linear().transpose() * physics.X_WB.linear();
   std::vector<PoseContext> contexts;
   for (const Measurement& m : poses.measurements) contexts.push_back(m.context);
-  const std::vector<ErrorPrediction> predictions = model->predict_all(contexts);
+  const std::vector<ErrorPrediction> predictions = model.predict_all(contexts);
   BiasAt bias;
   for (std::size_t i = 0; i < contexts.size(); ++i) {
     const Pose X_BT = physics.X_WB.inverse() * physics.pose_W(contexts[i]);
@@ -156,11 +155,10 @@ Status take_over(CompensatedModel::Parts& parts, const CompensatedModel& from, c
     parts.discrepancy = std::hypot(parts.discrepancy, found.discrepancy);
   for (const Measurement& m : met.measurements) parts.trained_with.emplace(m.context.tool, m.context.payload);
   if (!parts.bias) return {};
-  Result<PhysicalModel> learned = in_cell(from.learned_physics().whole(), found.model.cell);
-  if (!learned) return tl::make_unexpected(learned.error());
+  PhysicalModel learned = TRY(in_cell(from.learned_physics().whole(), found.model.cell));
   const auto before = static_cast<Index>(from.parts().parameters.size());
   const MatrixXd since = parts.bias_origin ? parts.bias_origin->covariance : MatrixXd::Zero(before, before);
-  parts.bias_origin = CompensatedModel::Parts::BiasOrigin{std::move(*learned), refit.carried(since)};
+  parts.bias_origin = CompensatedModel::Parts::BiasOrigin{std::move(learned), refit.carried(since)};
   return {};
 }
 
@@ -204,13 +202,12 @@ Result<Refit> refit_beside_bias(CompensatedModel::Parts& parts, const Compensate
     const bool settled = bias && rotation_log(R_WA_now * R_WA.transpose()).norm() < kSettledTurn;
     const bool last = !from.bias() || settled || round == kMostRounds;
     if (last || !bias) {
-      if (const Status taken = take_over(parts, from, *found, met); !taken) return tl::make_unexpected(taken.error());
+      TRY(take_over(parts, from, *found, met));
     }
     if (last) return found;
     if (!bias) {
-      Result<BiasAt> learned = bias_at(parts, poses);
-      if (!learned) return tl::make_unexpected(learned.error());
-      bias = std::move(*learned);
+      BiasAt learned = TRY(bias_at(parts, poses));
+      bias = std::move(learned);
     }
     R_WA = R_WA_now;
     met = without_bias(poses, *bias, R_WA);
@@ -222,8 +219,7 @@ Result<Refit> refit_beside_bias(CompensatedModel::Parts& parts, const Compensate
 Result<Refitted> refitted(const CompensatedModel& from, const std::shared_ptr<const Cell>& cell,
                           const CheckedBatch& batch, const MeasurementBatch& trained,
                           const std::vector<std::string>& only) {
-  if (const Status fits = check_may_start_from(from, *cell, trained, only); !fits)
-    return tl::make_unexpected(fits.error());
+  TRY(check_may_start_from(from, *cell, trained, only));
   const bool of_this_batch = lasting_sources(only) != only;
   const std::vector<std::string> sources = names_of(from);
   const bool is_its_own = batch.hash() == from.provenance().batch_hash;
@@ -236,14 +232,13 @@ Result<Refitted> refitted(const CompensatedModel& from, const std::shared_ptr<co
   }
   Refitted result;
   result.poses = as_met(from, *cell, trained, of_this_batch || is_its_own);
-  Result<Refit> found = refit_beside_bias(result.parts, from, cell, result.poses, only);
-  if (!found) return tl::make_unexpected(found.error());
+  Refit found = TRY(refit_beside_bias(result.parts, from, cell, result.poses, only));
   record(result.parts, from, batch, trained, only, of_this_batch);
   for (std::size_t i = 0; i < trained.measurements.size(); ++i)
     result.poses.measurements[i].sigma = trained.measurements[i].sigma;
-  result.found = std::move(found->result);
+  result.found = std::move(found.result);
   result.found.covariance.setZero();
-  result.found.covariance(found->anew, found->anew) = found->given_rest;
+  result.found.covariance(found.anew, found.anew) = found.given_rest;
   return result;
 }
 

@@ -15,13 +15,12 @@ namespace {
 /// 3 x N, m: what the sources, identified on `train`, leave of `judges`.
 Result<Eigen::Matrix3Xd> left_by(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& sources,
                                  const MeasurementBatch& train, const MeasurementBatch& judged_by) {
-  const Result<CalibrationResult> identified = calibrate(cell, with_unknown_tool(sources, *cell), train, {});
-  if (!identified) return tl::make_unexpected(identified.error());
-  const MeasurementBatch judges = aligned(judged_by, identified->sessions, cell->tracker);
+  const CalibrationResult identified = TRY(calibrate(cell, with_unknown_tool(sources, *cell), train, {}));
+  const MeasurementBatch judges = aligned(judged_by, identified.sessions, cell->tracker);
   Eigen::Matrix3Xd left(3, static_cast<Eigen::Index>(judges.measurements.size()));
   for (Eigen::Index i = 0; i < left.cols(); ++i) {
     const Measurement& m = judges.measurements[static_cast<std::size_t>(i)];
-    left.col(i) = m.p_W - identified->model.pose_W(m.context).translation();
+    left.col(i) = m.p_W - identified.model.pose_W(m.context).translation();
   }
   return left;
 }
@@ -45,8 +44,7 @@ Result<Supported> supported_by(const std::shared_ptr<const Cell>& cell, const st
 Result<Supported> supported_by(const SupportQuestion& question) {
   const std::vector<std::string>& found = question.found;
   Supported supported{found, {}};
-  auto with = question.left_by(found);
-  if (!with) return tl::make_unexpected(with.error());
+  auto with = TRY(question.left_by(found));
   while (supported.sources.size() > 1) {
     const auto asked = static_cast<double>(supported.left_out.size());
     Unsupported least;
@@ -63,7 +61,7 @@ Result<Supported> supported_by(const SupportQuestion& question) {
       if (!without) continue;  // the rest cannot do without it
       // Not of the ranks: a cause that acts at a tenth of the poses is outvoted there by those at which it does
       // nothing.
-      const double z = paired_gain(*without, *with).z_sum;
+      const double z = paired_gain(*without, with).z_sum;
       if (z > least.z || (z == least.z && !least.source.empty())) continue;
       least = {supported.sources[k], z};
       place = k;
@@ -72,7 +70,7 @@ Result<Supported> supported_by(const SupportQuestion& question) {
     if (least.source.empty()) break;
     supported.sources.erase(supported.sources.begin() + static_cast<std::ptrdiff_t>(place));
     supported.left_out.push_back(std::move(least));
-    *with = std::move(left);
+    with = std::move(left);
   }
   return supported;
 }

@@ -95,21 +95,19 @@ void record_training(CompensatedModel::Parts& parts, const CheckedBatch& batch, 
 
 /// Adds the model's figures on the poses that it was trained on.
 Status add_training_figures(CompensatedModel::Parts& parts, const MeasurementBatch& train) {
-  const Result<CompensatedModel> bare = CompensatedModel::make(parts);
-  if (!bare) return tl::make_unexpected(bare.error());
-  parts.training = bare->evaluate(train);
+  const CompensatedModel bare = TRY(CompensatedModel::make(parts));
+  parts.training = bare.evaluate(train);
   return {};
 }
 
 /// The model with its figures on the poses it was trained on and on those held out.
 Result<CompensatedModel> validated(CompensatedModel::Parts parts, const BatchSplit& split) {
-  if (const Status added = add_training_figures(parts, split.train); !added) return tl::make_unexpected(added.error());
+  TRY(add_training_figures(parts, split.train));
   Result<CompensatedModel> bare = CompensatedModel::make(parts);
   if (!bare) return bare;
   if (const double hidden = hidden_by_sigma(*bare); hidden > parts.discrepancy) {
     parts.discrepancy = hidden;
-    if (const Status added = add_training_figures(parts, split.train); !added)
-      return tl::make_unexpected(added.error());
+    TRY(add_training_figures(parts, split.train));
     bare = CompensatedModel::make(parts);
     if (!bare) return bare;
   }
@@ -149,20 +147,17 @@ Result<CompensatedModel> train_from(const CompensatedModel& from, const std::sha
   std::vector<LeftOutSession> unplaced = leave_out_unplaced(split);
   for (MeasurementBatch* rows : {&split.train, &split.validation}) {
     if (!has_sessions(*rows)) continue;
-    Result<InWorld> placed = in_world_of(from, *rows);
-    if (!placed) return tl::make_unexpected(placed.error());
-    *rows = std::move(placed->batch);
+    InWorld placed = TRY(in_world_of(from, *rows));
+    *rows = std::move(placed.batch);
   }
-  Result<Refitted> refit = refitted(from, cell, batch, split.train, options.refit);
-  if (!refit) return tl::make_unexpected(refit.error());
+  Refitted refit = TRY(refitted(from, cell, batch, split.train, options.refit));
   if (options.bias) {
-    if (const Status learned = add_bias_anew(*refit, *options.bias, options, report); !learned)
-      return tl::make_unexpected(learned.error());
+    TRY(add_bias_anew(refit, *options.bias, options, report));
   }
-  refit->parts.sessions_left_out = std::move(unplaced);
+  refit.parts.sessions_left_out = std::move(unplaced);
   if (!report("validating", 0.9)) return given_up();
-  record_stamp(refit->parts, batch, options);
-  return validated(std::move(refit->parts), split);
+  record_stamp(refit.parts, batch, options);
+  return validated(std::move(refit.parts), split);
 }
 
 /// Parts of a calibrated model; the slope is that of its physics.
@@ -215,10 +210,9 @@ Result<IdentifiedSessions> identified_by_most(Result<IdentifiedSessions> plain, 
 /// The physics, identified anew; `split` comes into its world.
 Result<IdentifiedSessions> identified(const std::shared_ptr<const Cell>& cell, BatchSplit& split,
                                       const TrainOptions& options, const Report& report) {
-  const Result<std::vector<std::string>> sources = sources_of(*cell, options);
-  if (!sources) return tl::make_unexpected(sources.error());
-  auto found = identified_by_most(identified_on(split.train, cell, *sources, options, report), split.train, cell,
-                                  *sources, options, report);
+  const std::vector<std::string> sources = TRY(sources_of(*cell, options));
+  auto found = identified_by_most(identified_on(split.train, cell, sources, options, report), split.train, cell,
+                                  sources, options, report);
   if (!found) return found;
   split.train = aligned(std::move(split.train), found->calibration.sessions, cell->tracker);
   split.validation = aligned(std::move(split.validation), found->calibration.sessions, cell->tracker);
@@ -229,18 +223,16 @@ Result<IdentifiedSessions> identified(const std::shared_ptr<const Cell>& cell, B
 Result<CompensatedModel> train_anew(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                     BatchSplit split, const TrainOptions& options, const Report& report) {
   std::vector<LeftOutSession> unplaced = leave_out_unplaced(split);
-  Result<IdentifiedSessions> found = identified(cell, split, options, report);
-  if (!found) return tl::make_unexpected(found.error());
-  const LeftOut left_out(found->calibration, split.train);
-  CompensatedModel::Parts parts = calibrated_parts(std::move(found->calibration), left_out);
-  parts.changes = std::move(found->changes);
+  IdentifiedSessions found = TRY(identified(cell, split, options, report));
+  const LeftOut left_out(found.calibration, split.train);
+  CompensatedModel::Parts parts = calibrated_parts(std::move(found.calibration), left_out);
+  parts.changes = std::move(found.changes);
   parts.sessions_as_given = !parts.sessions.empty() && !batch.rows().clock;
   parts.sessions_left_out = std::move(unplaced);
   const std::string asked = options.bias.value_or(cell->model.bias);
   const bool no_choice = asked == kAutoBias && has_gauges(batch.rows());
-  const Status learned = add_bias(parts, split.train, no_choice ? kNoBias : asked, left_out, options.seed,
-                                  [&](double share) { return report("learning the bias", 0.3 + 0.6 * share); });
-  if (!learned) return tl::make_unexpected(learned.error());
+  TRY(add_bias(parts, split.train, no_choice ? kNoBias : asked, left_out, options.seed,
+               [&](double share) { return report("learning the bias", 0.3 + 0.6 * share); }));
   if (no_choice) parts.bias_choice = BiasChoice{kNoBias, {}, kNoBiasOfGauges};
   if (!report("validating", 0.9)) return given_up();
   record_training(parts, batch, split.train, options);
@@ -280,12 +272,10 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const CheckedBa
     return !options.progress || options.progress(stage, share);
   };
   if (options.from) {
-    const Status fits = check_may_start_from(*options.from, *cell, batch.rows(), options.refit);
-    if (!fits) return tl::make_unexpected(fits.error());
+    TRY(check_may_start_from(*options.from, *cell, batch.rows(), options.refit));
   }
-  if (const Status gauges = check_gauges(batch.rows(), *cell, options); !gauges)
-    return tl::make_unexpected(gauges.error());
-  if (const Status read = check_read(batch.rows(), *cell, options); !read) return tl::make_unexpected(read.error());
+  TRY(check_gauges(batch.rows(), *cell, options));
+  TRY(check_read(batch.rows(), *cell, options));
   const BatchSplit split = prepared(batch, cell->tracker.sigma);
   if (split.train.measurements.empty()) return refused("no rows to train on").in("batch " + batch.id()).beyond(0, 1);
 
@@ -299,13 +289,10 @@ Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const CheckedBa
 Result<CompensatedModel> learn_bias(const CompensatedModel& calibrated, const CheckedBatch& batch,
                                     const TrainOptions& options) {
   const Cell& cell = calibrated.cell();
-  if (const Status positions = require_positions(batch.rows(), "a bias"); !positions)
-    return tl::make_unexpected(positions.error());
-  if (const Status oriented = check_orientations(batch.rows(), cell); !oriented)
-    return tl::make_unexpected(oriented.error());
-  const Result<InWorld> here = in_world_of(calibrated, batch.rows());
-  if (!here) return tl::make_unexpected(here.error());
-  const MeasurementBatch& rows = here->batch;
+  TRY(require_positions(batch.rows(), "a bias"));
+  TRY(check_orientations(batch.rows(), cell));
+  const InWorld here = TRY(in_world_of(calibrated, batch.rows()));
+  const MeasurementBatch& rows = here.batch;
   CompensatedModel::Parts parts = calibrated.parts();
   if (calibrated.provenance().batch_hash != batch.hash()) parts.suspects.clear();  // of other poses
   CalibrationResult as_it_is;
@@ -314,10 +301,8 @@ Result<CompensatedModel> learn_bias(const CompensatedModel& calibrated, const Ch
   as_it_is.suspects = parts.suspects;
   const LeftOut left_out(as_it_is, rows);
   parts.extrapolation_slope = extrapolation_slope(left_out, cell.robot);
-  const Status learned =
-      add_bias(parts, rows, options.bias.value_or(cell.model.bias), left_out, options.seed,
-               [&](double share) { return !options.progress || options.progress("learning the bias", share); });
-  if (!learned) return tl::make_unexpected(learned.error());
+  TRY(add_bias(parts, rows, options.bias.value_or(cell.model.bias), left_out, options.seed,
+               [&](double share) { return !options.progress || options.progress("learning the bias", share); }));
   record_training(parts, batch, rows, options);
   return validated(std::move(parts), {rows, {}});
 }
