@@ -258,7 +258,7 @@ Status serve(ServerConfig config, const Arguments& arguments) {
   HttpServer http(config.http,
                   {config.dds.server_id, config.dds.program_version, spoken_place(config.store), trainer, **store,
                    registry, [&service] { return service.figures(); }, [&service] { return service.movement(); }});
-  if (const Status listens = http.start(); !listens) return listens;
+  TRY(http.start());
   service.set_call_listener(log_call);
   service.set_packet_listener([](const char* event, const std::string& what) { tell(LogLevel::kWarn, event, what); });
   trainer.set_listeners(

@@ -177,7 +177,7 @@ class Members {
 }  // namespace
 
 Status check_json_limits(std::string_view json, const std::string& where, const JsonLimits& limits) {
-  if (const Status small = check_size(json, where, limits); !small) return small;
+  TRY(check_size(json, where, limits));
   Scanner scanner(json, where, limits);
   while (true) {
     const Result<Token> token = scanner.next();

@@ -118,7 +118,7 @@ Result<CalibrationResult> identify_with_sessions(const CalibrationProblem& probl
 /// priors are centred there.
 Status place_instruments(PhysicalModel& model, const MeasurementBatch& batch, const CalibrateOptions& options) {
   if (!has_gauges(batch)) return {};
-  if (const Status located = locate_anchors(model, batch); !located) return located;
+  TRY(locate_anchors(model, batch));
   const Eigen::Index base = place_of_base(model);
   if (base < 0 || has_positions(batch) || untold_motions(model, batch) > 0) return {};
   auto anywhere = std::make_shared<Cell>(*model.cell);
@@ -126,7 +126,7 @@ Status place_instruments(PhysicalModel& model, const MeasurementBatch& batch, co
   PhysicalModel frames = TRY(make_physical_model(anywhere, {"base", std::string(kAnchors)}));
   frames.X_WB = model.X_WB;
   frames.tools = model.tools;
-  if (const Status located = locate_anchors(frames, batch); !located) return located;
+  TRY(locate_anchors(frames, batch));
   CalibrateOptions free = options;
   free.held.clear();
   const CalibrationResult found = TRY(identify({frames, batch}, free));

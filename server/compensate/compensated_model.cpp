@@ -57,7 +57,7 @@ Status check_context(const PoseContext& context, Eigen::Index joints, std::size_
         .beyond(context.velocity->size(), joints);
   if (context.velocity && !context.velocity->allFinite())
     return refused("model: pose {} of the bias has a velocity that is not finite", row).of("velocity");
-  if (const Status history = check_history(context, joints, row); !history) return history;
+  TRY(check_history(context, joints, row));
   if (not_finite(context.time))
     return refused("model: pose {} of the bias has a time that is not finite", row).of("time");
   if (not_finite(context.temperature))
@@ -127,7 +127,7 @@ Status check_fit(const ModelParts& parts) {
   }
   if (!std::isfinite(parts.bias_spread) || parts.bias_spread < 1)
     return refused("model: a bias_spread of {}, at least 1 is expected", parts.bias_spread).of("bias_spread");
-  if (Status origin = check_origin(parts); !origin) return origin;
+  TRY(check_origin(parts));
   if (parts.bias && parts.bias->q.cols() != n)
     return refused("model: the bias knows {} joints, the robot {}", parts.bias->q.cols(), n);
   return {};

@@ -152,7 +152,7 @@ struct Step {
 /// Runs the steps one after the other. Busy where the caller gives up in between.
 Status run(const std::vector<Step>& steps, const DiagnoseOptions& options) {
   for (const Step& step : steps) {
-    if (Status wanted = report_progress(options, step.what, step.share); !wanted) return wanted;
+    TRY(report_progress(options, step.what, step.share));
     step.tell();
   }
   return {};

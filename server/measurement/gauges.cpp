@@ -28,7 +28,7 @@ Result<std::string> resolved(const std::string& name, const Cell& cell, const An
 Status check_minus(Gauge& gauge, const Cell& cell) {
   if (gauge.minus == nullptr) return {};
   PoseContext other = *gauge.minus;
-  if (const Status pose = check_pose(other, cell); !pose) return pose;
+  TRY(check_pose(other, cell));
   gauge.minus = std::make_shared<const PoseContext>(std::move(other));
   return {};
 }

@@ -59,7 +59,7 @@ Result<StoreCopy> checked(Database& database, const std::string& path) {
 Status copy_pages(const std::string& from, const std::string& to, const std::function<void(double)>& progress) {
   SqliteDatabase source(uri_to_look_at(from), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
   const Transaction moment(source, Transaction::For::kReading);
-  if (const Status ours = check_is_store(source, from); !ours) return ours;
+  TRY(check_is_store(source, from));
   SqliteDatabase target(to, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout);
   return with_our_errors([&]() -> Status {
     SQLite::Backup backup(target.file(), source.file());
@@ -80,7 +80,7 @@ Result<StoreCopy> back_up_store(const std::string& from, const std::string& to,
   Result<StoreCopy> copy;
   TRY(make_store_file(to, [&](const std::string& part) -> Status {
     try {
-      if (const Status copied = copy_pages(from, part, progress); !copied) return copied;
+      TRY(copy_pages(from, part, progress));
       copy = check_store_copy(part);
       return copy.map([](const StoreCopy&) {});
     } catch (const DatabaseError& error) {

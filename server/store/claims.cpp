@@ -72,7 +72,7 @@ Status claim_job(Database& database, const Worker& worker, std::int64_t job) {
   const std::string cell = cell_of_job(database, job);
   lock_cell(database, cell);
   lock_job(database, job);
-  if (const Status free = check_free(database, worker, cell); !free) return free;
+  TRY(check_free(database, worker, cell));
   const int begun = change(
       database,
       "UPDATE jobs SET state = 'running', attempts = attempts + 1 WHERE id = $1 AND state IN ('queued', 'running')",

@@ -71,12 +71,12 @@ Status FileConnection::read(const Job& job) {
 
 Status FileConnection::write(const Job& job) {
   const MutexLock guard(mutex_);
-  if (auto sure = be_sure_of_file(); !sure) return sure;
+  TRY(be_sure_of_file());
   bool changed = false;
   Status result = transacted(job, &changed);
   file_.remember();
   if (!result || !changed) return result;
-  if (auto there = check_in_place(); !there) return there;
+  TRY(check_in_place());
   note_written();
   return result;
 }
@@ -85,7 +85,7 @@ Status FileConnection::transacted(const Job& job, bool* changed) {
   try {
     Transaction transaction(*database_, Transaction::For::kWriting);
     const int changes = database_->total_changes();
-    if (Status result = job(*database_); !result) return result;
+    TRY(job(*database_));
     transaction.do_last();
     *changed = database_->total_changes() != changes;
     auto mark = *changed ? mark_of(*database_) : mark_;
@@ -142,11 +142,11 @@ Status FileConnection::open_anew() {
 
 Status FileConnection::opened_anew() {
   database_.reset();  // one connection at a time: its locks are the process's
-  if (auto held = file_.hold(); !held) return held;
+  TRY(file_.hold());
   auto opened = TRY(open_database(path, *copies));
   database_ = std::move(opened.file);
   if (opened.why_not_written) return tl::make_unexpected(*opened.why_not_written);
-  if (auto held = file_.hold(); !held) return held;
+  TRY(file_.hold());
   note_opened();
   must_be_opened_anew_ = false;
   return {};

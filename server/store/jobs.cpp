@@ -171,7 +171,7 @@ Result<StoredJob> read_job(Database& database, std::int64_t id) {
 
 Status end_job(Database& database, const Worker& worker, std::int64_t id, const std::string& cell, int model_version,
                const std::string& message, const JobOutcome& outcome) {
-  if (const Status held = check_held(database, worker, id, true); !held) return held;
+  TRY(check_held(database, worker, id, true));
   return changed_one(change(database,
                             "UPDATE jobs SET state = 'done', model_version = $1, message = $2 "
                             "WHERE id = $3 AND ($4 = '' OR cell = $4) AND state IN ('queued', 'running')",
@@ -324,7 +324,7 @@ Result<std::vector<StoredCheck>> Store::health_checks(const std::string& cell, s
 
 Status Store::store_findings(std::int64_t job, const std::string& findings, const std::string& page) {
   return connection_->in_transaction([&](Database& database) -> Status {
-    if (const Status held = check_held(database, connection_->worker, job, true); !held) return held;
+    TRY(check_held(database, connection_->worker, job, true));
     const int changes =
         change(database, "UPDATE diagnoses SET findings = $1, page = $2 WHERE job = $3", findings, page, job);
     change(database,
@@ -379,7 +379,7 @@ Status Store::set_job_running(std::int64_t id) {
 
 Status Store::set_job_queued(std::int64_t id, bool attempt_counts) {
   return connection_->in_transaction([&](Database& database) -> Status {
-    if (const Status held = check_held(database, connection_->worker, id); !held) return held;
+    TRY(check_held(database, connection_->worker, id));
     return changed_one(
         change(database,
                "UPDATE jobs SET state = 'queued', attempts = attempts - CASE WHEN attempts > 0 THEN $1 ELSE 0 END "

@@ -52,12 +52,12 @@ Status check_is_new(const std::string& path) {
 }  // namespace
 
 Status make_store_file(const std::string& path, const std::function<Status(const std::string& part)>& make) {
-  if (const Status is_new = check_is_new(path); !is_new) return is_new;
+  TRY(check_is_new(path));
   remove_leftover_parts(path);
   const std::string part = part_beside(path).string();
   const Unfinished unfinished(part);
-  if (const Status made = make(part); !made) return made;
-  if (const Status there = on_disk(part); !there) return there;
+  TRY(make(part));
+  TRY(on_disk(part));
   if (::link(part.c_str(), path.c_str()) != 0)  // unlike a rename it replaces nothing
     return failure(ErrorCode::kRefused, "cannot be written: {}", std::strerror(errno)).in(path).next(kElsewhere);
   const fs::path folder = fs::path(path).parent_path();

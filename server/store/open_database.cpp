@@ -66,10 +66,10 @@ Status check_identity(Database& database, const std::string& path, ServedCopies&
 
 Attempt open_for_writing(const std::string& path, ServedCopies& copies) {
   return attempt(path, [&](std::unique_ptr<SqliteDatabase>& file) -> Status {
-    if (auto fine = check_there(path, copies); !fine) return fine;
+    TRY(check_there(path, copies));
     file = std::make_unique<SqliteDatabase>(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout);
-    if (auto ready = prepare_file(*file, path); !ready) return ready;
-    if (auto here = check_not_moved(*file, path); !here) return here;
+    TRY(prepare_file(*file, path));
+    TRY(check_not_moved(*file, path));
     return check_identity(*file, path, copies);
   });
 }
@@ -85,7 +85,7 @@ Attempt open_for_reading(const std::string& path, ServedCopies& copies) {
     last = attempt(path, [&, named = name, how = flags](std::unique_ptr<SqliteDatabase>& file) -> Status {
       file = std::make_unique<SqliteDatabase>(named, how, kBusyTimeout);
       if (how == SQLite::OPEN_READWRITE) file->execute("PRAGMA locking_mode = EXCLUSIVE");
-      if (auto ours = check_readable(*file, path); !ours) return ours;
+      TRY(check_readable(*file, path));
       return check_identity(*file, path, copies);
     });
     if (last.file) return last;
@@ -139,7 +139,7 @@ Status check_state(const std::string& path, const std::optional<StoreMark>& mark
   const Attempt look = attempt(path, [&](std::unique_ptr<SqliteDatabase>& file) -> Status {
     file =
         std::make_unique<SqliteDatabase>(immutable_uri(path), SQLite::OPEN_READONLY | SQLite::OPEN_URI, kBusyTimeout);
-    if (auto ours = check_readable(*file, path); !ours) return ours;
+    TRY(check_readable(*file, path));
     const auto is = mark_of(*file);
     if (!mark) return {};
     if (!is) return wrong("was replaced or written over by another program, and cannot be read");

@@ -87,7 +87,7 @@ Status check_owner(Database& database, const std::string& path) {
 }  // namespace
 
 Status prepare_file(Database& database, const std::string& path) {
-  if (auto owner = check_owner(database, path); !owner) return owner;
+  TRY(check_owner(database, path));
   const std::string mode = text_of(database, "PRAGMA journal_mode = WAL");
   if (mode != "wal") return failure(ErrorCode::kInternal, "this file system cannot hold a WAL ({})", mode).in(path);
   database.execute("PRAGMA synchronous = FULL");
@@ -114,7 +114,7 @@ Status prepare_file(Database& database, const std::string& path) {
 }
 
 Status check_readable(Database& database, const std::string& path) {
-  if (auto owner = check_owner(database, path); !owner) return owner;
+  TRY(check_owner(database, path));
   const bool has_all =
       database.has_table("audit_end") && database.has_table("cells") && database.has_table("job_claims");
   if (integer_of(database, "PRAGMA user_version") == kSchemaVersion && has_all) return {};

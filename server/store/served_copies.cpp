@@ -161,12 +161,12 @@ Status ServedCopies::keep(const std::string& cell, std::int64_t activation, int 
   const std::string file = where + "/" + name_of(activation, version);
   const std::string part = file + kPart;
   remove_parts(where);
-  if (auto written = write_part(part, content); !written) return written;
+  TRY(write_part(part, content));
   fs::rename(part, file, error);
   if (error) return failure(ErrorCode::kInternal, "cannot be renamed: {}", error.message()).in(part);
-  if (auto synced = sync_folder(where); !synced) return synced;
+  TRY(sync_folder(where));
   if (is_new) {
-    if (auto synced = sync_folder(folder()); !synced) return synced;
+    TRY(sync_folder(folder()));
   }
   std::set<int> seen;
   for (const Copy& copy : of(cell)) {

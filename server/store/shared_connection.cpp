@@ -47,8 +47,8 @@ Result<std::unique_ptr<StoreConnection>> SharedConnection::open(const std::strin
 
 Status SharedConnection::admit(Database& database) {
   try {
-    if (const Status ours = check_shared_schema(database, path); !ours) return ours;
-    if (const Status here = check_not_moved(database, path); !here) return here;
+    TRY(check_shared_schema(database, path));
+    TRY(check_not_moved(database, path));
     const std::string id = text_of(database, "SELECT id FROM store_identity WHERE id <> ''");
     const auto known = copies->stores();
     if (!known.empty() && std::find(known.begin(), known.end(), id) == known.end())

@@ -118,7 +118,7 @@ Result<StoreContent> copy_to_file(Database& source, const std::string& from, con
   TRY(make_store_file(to, [&](const std::string& part) -> Status {
     {
       SqliteDatabase target(part, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout);
-      if (const Status ready = prepare_file(target, part); !ready) return ready;
+      TRY(prepare_file(target, part));
       // One file, and nothing beside it.
       target.execute("PRAGMA journal_mode = DELETE");
       content = fill(source, from, target, to, progress);

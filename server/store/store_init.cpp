@@ -13,7 +13,7 @@ Status init_store(const std::string& url, const std::string& role) {
   const auto database = PostgresDatabase::connect(url, PostgresDatabase::Session::kWrites);
   if (!database) return Failure(database.error()).in(place);
   try {
-    if (const Status made = migrate_shared_schema(**database, place); !made) return made;
+    TRY(migrate_shared_schema(**database, place));
     return role.empty() ? Status() : grant_shared_store(**database, role);
   } catch (const DatabaseError& error) {
     return failure_of(error, place);

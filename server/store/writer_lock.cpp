@@ -37,7 +37,7 @@ Failure held(const std::string& file, int descriptor, const std::string& lock) {
 }  // namespace
 
 Status WriterLock::look(const std::string& file) {
-  if (Status free = StoreFile(file).hold(); !free) return free;
+  TRY(StoreFile(file).hold());
   const std::string path = lock_path_of(file);
   const WriterLock lock(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (lock.descriptor_ < 0) {

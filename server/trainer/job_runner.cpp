@@ -219,7 +219,7 @@ Status JobRunner::give_batches(Computing& computing, const StoredJob& job, const
   const auto sources = TRY(batch_sources(store_, job, !asked || asked->apply, earlier));
   for (const BatchSource& source : sources) {
     const auto stored = TRY(store_.batch(job.cell, source.id));
-    if (Status taken = computing.take({source.id, stored.csv, stored.accepted_at}, source.judges); !taken) return taken;
+    TRY(computing.take({source.id, stored.csv, stored.accepted_at}, source.judges));
   }
   if (asked && job.batch_ids.empty()) return computing.take({"", asked->csv, job.created_at}, false);
   return {};

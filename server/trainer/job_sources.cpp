@@ -16,7 +16,7 @@ Status check_own(const Store& store, const StoredJob& job, const std::set<std::s
   const auto may_release = TRY(store.may_release(job.id));
   for (const StoredBatch& batch : stored) {
     if (!own.contains(batch.id) || may_release) continue;
-    if (Status free = check_released(batch); !free) return free;
+    TRY(check_released(batch));
   }
   return {};
 }

@@ -46,9 +46,9 @@ Status check_most(const char* field, std::size_t asked, std::size_t most, const 
 /// Level and bias of a training that is asked for; empty: as usual.
 Status check_spellings(const Cell& cell, const std::string& level, const std::string& bias) {
   if (!level.empty()) {
-    if (Status fits = check_most("level", level.size(), kMostSpellingBytes, "bytes"); !fits) return fits;
+    TRY(check_most("level", level.size(), kMostSpellingBytes, "bytes"));
     const auto specs = TRY(parse_level(level));
-    if (Status fits = check_most("level", specs.size(), kMaxSources, "error sources"); !fits) return fits;
+    TRY(check_most("level", specs.size(), kMaxSources, "error sources"));
     for (const std::string& spec : spelled_out(specs, cell)) {
       TRY(make_error_source(spec, cell));
     }
@@ -449,7 +449,7 @@ Status Trainer::activate(const std::string& cell, int version, const ChangeId& i
   const auto made = TRY(store_.outcome_of(id));
   if (made) return {};
   const auto as_judged = [&](const ChangeId& decided) -> Status {
-    if (const Status as_seen = store_.check_expected(cell, decided); !as_seen) return as_seen;
+    TRY(store_.check_expected(cell, decided));
     const auto judged = judged_beside_present(cell, version);
     if (!judged && !force) return tl::make_unexpected(judged.error());
     const std::optional<GateVerdict> verdict = judged ? *judged : std::nullopt;

@@ -150,8 +150,7 @@ class Backup {
                                                           "orient_u1", "orient_u2", "orient_u3"};
     std::array<double, 7> v{};
     for (std::size_t k = 0; k < kParts.size(); ++k) {
-      if (Status read = number(robot, fmt::format("base_frame_{}", kParts[k]), k == 3 ? 1 : 0, v[k]); !read)
-        return read;
+      TRY(number(robot, fmt::format("base_frame_{}", kParts[k]), k == 3 ? 1 : 0, v[k]));
     }
     const Eigen::Quaterniond q(v[3], v[4], v[5], v[6]);
     if (std::abs(q.norm() - 1) > 1e-2) {
@@ -179,8 +178,8 @@ class Backup {
         return {};
       }
       double lower = 0, upper = 0;
-      if (Status read = number(*arm, "lower_joint_bound", 0, lower); !read) return read;
-      if (Status read = number(*arm, "upper_joint_bound", 0, upper); !read) return read;
+      TRY(number(*arm, "lower_joint_bound", 0, lower));
+      TRY(number(*arm, "upper_joint_bound", 0, upper));
       if (!(lower < upper)) {
         return refused("axis {}: bounds {:g} and {:g} rad", k + 1, lower, upper)
             .in(where_)
@@ -208,11 +207,11 @@ class Backup {
   }
 
   Status read_modules(const std::vector<SourceFile>& modules) {
-    if (Status text = check_texts(modules); !text) return text;
+    TRY(check_texts(modules));
     const RapidData data = read_rapid_data(modules);
     const Pose X_BW = cell_.X_WB.inverse();
     for (const ProgramTool& tool : data.tools) {
-      if (Status taken = take(tool); !taken) return taken;
+      TRY(take(tool));
     }
     take_frames(data);
     take_loads(data);

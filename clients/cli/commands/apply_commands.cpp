@@ -129,7 +129,7 @@ Status predict(const ApplyArguments& arguments) {
   Predictions predictions =
       TRY(arguments.service.service ? predict_by_service(list, arguments) : predict_here(list, arguments));
   warn_of_notes(predictions.notes);
-  if (const Status added = add_uncertainties(predictions, arguments); !added) return added;
+  TRY(add_uncertainties(predictions, arguments));
   return write_together({{"--output", arguments.output, predictions_csv(list, predictions)},
                          {"--json", arguments.json, json_text(predictions_json(list, predictions))}});
 }

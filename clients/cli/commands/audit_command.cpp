@@ -62,7 +62,7 @@ Status audit(const AuditArguments& arguments) {
     if (const Status good = check_rows(trail); !good && !broken) broken = Failure(good.error()).in(where).value();
   }
   tell(text, {arguments.json});
-  if (const Status written = write_json(arguments.json, {{"trails", json}}); !written) return written;
+  TRY(write_json(arguments.json, {{"trails", json}}));
   return broken ? Status(tl::make_unexpected(*broken)) : Status();
 }
 

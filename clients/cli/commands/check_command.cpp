@@ -192,7 +192,7 @@ void add_check_command(CLI::App& app, Action& chosen) {
   add_service_options(*command, arguments->service);
   command->callback([arguments, &chosen] {
     chosen = [arguments]() -> Status {
-      if (const Status usable = check_outputs(*arguments); !usable) return usable;
+      TRY(check_outputs(*arguments));
       return arguments->service.service ? check_at_service(*arguments) : check(*arguments);
     };
   });

@@ -126,10 +126,10 @@ Status write_texts(const Texts& texts, const std::vector<std::string>& programs)
   std::vector<TextFile> files;
   std::copy_if(texts.begin(), texts.end(), std::back_inserter(files),
                [](const TextFile& text) { return text.path != "-"; });
-  if (const Status written = write_text_files(files); !written) return written;
+  TRY(write_text_files(files));
   for (const TextFile& text : texts) {
     if (text.path != "-") continue;
-    if (const Status written = write_output("-", text.text); !written) return written;
+    TRY(write_output("-", text.text));
   }
   return {};
 }

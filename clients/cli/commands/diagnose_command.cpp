@@ -147,7 +147,7 @@ Status write_diagnosis(const ordered_json& json, std::string page, Outputs& outp
   if (poses) outputs.put("--next-poses", next_poses_csv(json));
   outputs.put("--report", with_pages_beside(std::move(page), arguments.report));
   outputs.put("--json", json_text(json));
-  if (const Status written = outputs.write(); !written) return written;
+  TRY(outputs.write());
   if (!poses && !arguments.next_poses.empty()) {
     fmt::print(stderr, "{}: not written, no poses are suggested: {}\n", shown(arguments.next_poses),
                shown_lines(json.at("next_poses_for").at("none_because").get<std::string>()));

@@ -55,12 +55,12 @@ Status fleet(const FleetArguments& arguments) {
   Outputs outputs;
   outputs.add("--report", arguments.report);
   outputs.add("--json", arguments.json);
-  if (const Status usable = outputs.check({}); !usable) return usable;
+  TRY(outputs.check({}));
   const ordered_json json =
       TRY(arguments.service.service ? fleet_of_service(arguments) : fleet_of_files(arguments.models));
   if (!arguments.report.empty()) {
     const std::string page = with_pages_beside(fleet_page(json, unix_now()), arguments.report);
-    if (const Status written = write_output(arguments.report, page); !written) return written;
+    TRY(write_output(arguments.report, page));
   }
   try {
     tell(fleet_text(json), {arguments.json, arguments.report});

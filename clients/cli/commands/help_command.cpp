@@ -64,7 +64,7 @@ Status write_manual(const CLI::App& app, const std::string& folder) {
   std::filesystem::create_directories(folder, error);
   if (error) return refused("cannot be made: {}", error.message()).in(folder).next("name a folder that you may write");
   const std::vector<TextFile> pages = manual_pages(described(app), app.version(), folder);
-  if (const Status written = write_text_files(pages); !written) return written;
+  TRY(write_text_files(pages));
   tell(fmt::format("{} pages in {}\n", pages.size(), folder), {});
   return {};
 }

@@ -108,11 +108,11 @@ Status history(const HistoryArguments& arguments) {
   outputs.add("--json", arguments.json);
   std::vector<NamedFile> inputs;
   for (const std::string& path : arguments.models) inputs.push_back({"--model", path});
-  if (const Status usable = outputs.check(inputs); !usable) return usable;
+  TRY(outputs.check(inputs));
   const CellHistory found = TRY(arguments.models.empty() ? history_of_service(arguments) : history_of_files(arguments));
   outputs.put("--output", with_pages_beside(history_page(found), arguments.output));
   outputs.put("--json", json_text(history_json(found)));
-  if (const Status written = outputs.write(); !written) return written;
+  TRY(outputs.write());
   tell(fmt::format("cell {}: {} versions, {} parameters moved by more than their uncertainty\n", found.cell,
                    found.versions.size(), moved_parametersfound.size()),
        {arguments.output, arguments.json});

@@ -82,7 +82,7 @@ Status convert(const ConvertArguments& arguments) {
     if (m.context.payload.empty()) m.context.payload = arguments.payload;
   }
   const std::size_t count = converted.batch.measurements.size();
-  if (const Status written = write_output(arguments.output, to_csv(converted.batch)); !written) return written;
+  TRY(write_output(arguments.output, to_csv(converted.batch)));
   tell(fmt::format("{} measurements in {}{}\n", count, arguments.output,
                    converted.not_measured == 0
                        ? ""
@@ -161,7 +161,7 @@ Status localise_batch(const ReferencesArguments& arguments, const ReferenceCheck
         .with_text(check.worst);
   }
   return read_batch_file(arguments.batch).and_then([&](MeasurementBatch batch) {
-    if (Status positions = require_positions(batch, "references --batch"); !positions) return positions;
+    TRY(require_positions(batch, "references --batch"));
     const Pose X_WV = check.verdict == ReferenceVerdict::kFine ? Pose::Identity() : check.X_WV;
     return write_output(arguments.output, to_csv(localised(std::move(batch), X_WV)));
   });
@@ -177,7 +177,7 @@ Status check_reflectors(const ReferencesArguments& arguments) {
   const ReferenceCheck check = TRY(
       check_references(nominal, measured, {from_mm(arguments.localise_above_mm), from_mm(arguments.repeat_above_mm)}));
   tell(references_text(check), {arguments.output, arguments.json});
-  if (const Status written = write_json(arguments.json, references_json(check)); !written) return written;
+  TRY(write_json(arguments.json, references_json(check)));
   return localise_batch(arguments, check);
 }
 

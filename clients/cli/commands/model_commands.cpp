@@ -60,7 +60,7 @@ struct TrainArguments {
 /// differ: another difference would be learned as part of them.
 Status hold_against(const CompensatedModel& from, const std::vector<std::string>& refit, const Cell& cell,
                     const CheckedBatch& batch) {
-  if (const Status fits = check_may_start_from(from, cell, batch.rows(), refit); !fits) return fits;
+  TRY(check_may_start_from(from, cell, batch.rows(), refit));
   const auto& rows = batch.rows().measurements;
   const bool known = std::all_of(rows.begin(), rows.end(), [&](const Measurement& m) { return knows(from, m); });
   if (!known) return {};  // its tools are others: nothing to compare
@@ -171,10 +171,10 @@ Status train_model(const TrainArguments& arguments) {
     options.from = std::move(from);
     std::vector<std::string> refit = TRY(parse_level(arguments.refit));
     options.refit = std::move(refit);
-    if (const Status fits = hold_against(*options.from, options.refit, cell, batch); !fits) return fits;
+    TRY(hold_against(*options.from, options.refit, cell, batch));
   }
   const auto shared = std::make_shared<const Cell>(std::move(cell));
-  if (const Status first = check_first_batch(arguments, shared, batch); !first) return first;
+  TRY(check_first_batch(arguments, shared, batch));
   const CompensatedModel model = TRY([&] {
     ProgressLine progress;
     options.progress = [&](const std::string& stage, double share) {
@@ -183,7 +183,7 @@ Status train_model(const TrainArguments& arguments) {
     };
     return train(shared, batch, options);
   }());
-  if (const Status written = write_output(arguments.output, serialize(model)); !written) return written;
+  TRY(write_output(arguments.output, serialize(model)));
   const auto& parts = model.parts();
   const std::vector<Unlike> unlike = options.fleet ? unlike_twins(parts, *options.fleet) : std::vector<Unlike>();
   const std::optional<Jump> jump = arguments.as_read && !options.from ? jump_beside(model, batch) : std::nullopt;
@@ -236,7 +236,7 @@ Status check_outputs(const EvaluateArguments& arguments) {
 }
 
 Status evaluate(const EvaluateArguments& arguments) {
-  if (const Status fit = check_outputs(arguments); !fit) return fit;
+  TRY(check_outputs(arguments));
   const CompensatedModel model = TRY(load_model(arguments.model));
   const CheckedBatch batch = TRY(read_checked_batches(arguments.batches, model.cell()));
   const InWorld world = TRY(in_world_of(model, batch.rows()));
@@ -282,7 +282,7 @@ Status report(const ReportArguments& arguments) {
   std::string note;
   if (!arguments.batch.empty()) {
     const CheckedBatch checked = TRY(read_checked_batches({arguments.batch}, model.cell()));
-    if (const Status positions = require_positions(checked.rows(), "report --batch"); !positions) return positions;
+    TRY(require_positions(checked.rows(), "report --batch"));
     InWorld world = TRY(in_world_of(model, checked.rows()));
     const std::size_t learned = std::erase_if(world.batch.measurements, LearnedFrom(model, checked.hash()));
     if (!world.batch.measurements.empty()) batch = std::move(world.batch);

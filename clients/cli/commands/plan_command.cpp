@@ -201,7 +201,7 @@ Status plan(PlanArguments arguments) {
   if (arguments.options.count == 0 && arguments.check == 0 && arguments.from.empty()) {
     return failure(ErrorCode::kUsage, "--count, --check or --from is required").of("--count");
   }
-  if (const Status criterion = read_criterion(arguments.criterion, arguments.options); !criterion) return criterion;
+  TRY(read_criterion(arguments.criterion, arguments.options));
   if (arguments.check > 0) {
     arguments.criterion = "check";
     arguments.options.criterion = PlanCriterion::kCheck;
@@ -217,7 +217,7 @@ Status plan(PlanArguments arguments) {
     planned = ordered_for_travel(cell->robot, std::move(*planned));
   Outputs outputs = TRY(outputs_of(*cell, arguments, *planned));
   outputs.put("--json", json_text(as_json(*cell, arguments, *planned)));
-  if (const Status written = outputs.write(); !written) return written;
+  TRY(outputs.write());
   tell(in_words(*cell, arguments, *planned),
        {arguments.output, arguments.rapid, arguments.krl, arguments.fanuc, arguments.urscript, arguments.json});
   return {};

@@ -49,7 +49,7 @@ Status simulate_batch(const SimulateArguments& arguments) {
   MeasurementBatch batch = TRY(simulate(robot, poses, options));
   batch.joint_types = list.joint_types;
   for (std::size_t i = 0; i < poses.size(); ++i) batch.measurements[i].pose_id = list.poses[i].pose_id;
-  if (const Status written = write_output(arguments.output, to_csv(batch)); !written) return written;
+  TRY(write_output(arguments.output, to_csv(batch)));
   tell(fmt::format("{} measurements in {}\n", batch.measurements.size(), arguments.output),
        {arguments.output, arguments.json});
   return write_json(arguments.json, {{"cell", cell->name},

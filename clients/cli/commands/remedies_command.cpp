@@ -63,7 +63,7 @@ Status remedies(const RemediesArguments& arguments) {
   tell(text, {arguments.output, arguments.json});
   if (!arguments.output.empty()) {
     const std::string page = with_pages_beside(remedies_page(model, budget, where), arguments.output);
-    if (const Status written = write_output(arguments.output, page); !written) return written;
+    TRY(write_output(arguments.output, page));
   }
   return write_json(arguments.json, remedies_json(model, budget));
 }

@@ -30,13 +30,13 @@ Status export_robot(const RobotArguments& arguments) {
   outputs.add("--output", arguments.output);
   outputs.add("--table", arguments.table);
   outputs.add("--json", arguments.json);
-  if (const Status usable = outputs.check({{"--model", arguments.model}}); !usable) return usable;
+  TRY(outputs.check({{"--model", arguments.model}}));
   const CompensatedModel model = TRY(load_model(arguments.model));
   const RigidRobot robot = rigid_robot(model);
   outputs.put("--output", yaml ? robot_yaml_text(model, robot) : urdf_text(model, robot));
   outputs.put("--table", robot_table(model, robot));
   outputs.put("--json", json_text(robot_json(model, robot)));
-  if (const Status written = outputs.write(); !written) return written;
+  TRY(outputs.write());
   tell(fmt::format("robot of model {} in {}\n{}", model.provenance().id, arguments.output, left_out_text(robot)),
        {arguments.output, arguments.table, arguments.json});
   return {};

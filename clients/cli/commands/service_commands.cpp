@@ -214,7 +214,7 @@ Status change_batch(client::Session& session, const ServiceArguments& arguments,
   const std::string cell = TRY(cell_id(arguments.cell));
   const client::ChangeOptions options = TRY(decided_against(session, cell, arguments));
   const std::string& batch = arguments.batch_id;
-  if (const Status changed = (session.*change)(cell, batch, options); !changed) return changed;
+  TRY((session.*change)(cell, batch, options));
   tell(fmt::format("cell {}: batch {} is {}\n", cell, batch, now), {arguments.json});
   return write_json(arguments.json, {{"cell", cell}, {"batch", batch}, {"is", now}});
 }
@@ -228,7 +228,7 @@ Status discard(client::Session& session, const ServiceArguments& arguments) {
 }
 
 Status cancel(client::Session& session, const ServiceArguments& arguments) {
-  if (const Status asked = session.cancel(arguments.job); !asked) return asked;
+  TRY(session.cancel(arguments.job));
   tell(fmt::format("job {} is cancelled; if it ran, it stops as soon as it can\n", arguments.job), {arguments.json});
   return write_json(arguments.json, {{"job", arguments.job}, {"is", "cancelled"}});
 }
@@ -281,7 +281,7 @@ Status show_model(client::Session& session, const ServiceArguments& arguments) {
 Status export_model(client::Session& session, const ServiceArguments& arguments) {
   const ModelReference model = TRY(parse_model_reference(arguments.model));
   const std::string text = TRY(session.export_model(model.cell, model.version));
-  if (const Status written = write_output(arguments.output, text); !written) return written;
+  TRY(write_output(arguments.output, text));
   tell(fmt::format("model of cell {} in {}\n", model.cell, arguments.output), {arguments.output, arguments.json});
   return write_json(arguments.json, {{"cell", model.cell}, {"file", arguments.output}, {"bytes", text.size()}});
 }

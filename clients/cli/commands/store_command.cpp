@@ -42,7 +42,7 @@ nlohmann::ordered_json json_of(const std::string& place, const StoreContent& con
 }
 
 Status init(const StoreArguments& arguments) {
-  if (const Status made = init_store(arguments.place, arguments.role); !made) return made;
+  TRY(init_store(arguments.place, arguments.role));
   const std::string place = spoken_place(arguments.place);
   tell(fmt::format("{} is a store{}\n", place, arguments.role.empty() ? "" : "; " + arguments.role + " may use it"),
        {arguments.json});
@@ -67,7 +67,7 @@ Status copy(const StoreArguments& arguments) {
 }
 
 Status reopen(const StoreArguments& arguments) {
-  if (const Status open = reopen_store(arguments.place); !open) return open;
+  TRY(reopen_store(arguments.place));
   const std::string place = spoken_place(arguments.place);
   tell(fmt::format("{} may be served again\n", place), {arguments.json});
   return write_json(arguments.json, {{"place", place}});

@@ -23,7 +23,7 @@ Status cpa(const CpaArguments& arguments) {
   if (arguments.sigma_mm > 0) options.sigma = from_mm(arguments.sigma_mm);
   const CirclePointResult result = TRY(analyse_circle_points(robot, arcs, options));
   if (!arguments.output.empty()) {
-    if (const Status written = write_output(arguments.output, circle_point_csv(result)); !written) return written;
+    TRY(write_output(arguments.output, circle_point_csv(result)));
   }
   tell(circle_point_text(result), {arguments.output, arguments.json});
   return write_json(arguments.json, circle_point_json(result));

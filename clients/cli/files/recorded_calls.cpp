@@ -112,7 +112,7 @@ Status read_file(const std::string& path, const std::function<Status(const Recor
     ++read.requests;
     call->file = path;
     call->line = line;
-    if (const Status taken = take(*call); !taken) return taken;
+    TRY(take(*call));
   }
   return {};
 }

@@ -157,7 +157,7 @@ Status check_millimetres(const TargetFile& file, const Chain& robot) {
 
 Status check_targets(const TargetFile& file, const Chain& robot) {
   if (!file.joint_types.empty()) {
-    if (const Status joints = check_joint_columns(file.joint_types, robot, file.where); !joints) return joints;
+    TRY(check_joint_columns(file.joint_types, robot, file.where));
   }
   for (const TargetRow& row : file.rows) {
     const auto directions = static_cast<int>(row.target.direction.size());
@@ -167,7 +167,7 @@ Status check_targets(const TargetFile& file, const Chain& robot) {
         .of(fmt::format("dir{}", directions))
         .beyond(directions, robot.size());
   }
-  if (const Status metres = check_millimetres(file, robot); !metres) return metres;
+  TRY(check_millimetres(file, robot));
   if (has_spherical_wrist(robot)) return {};
   for (const TargetRow& row : file.rows) {
     if (!row.target.conf) continue;

@@ -112,10 +112,10 @@ Status Outputs::check_apart(const std::vector<NamedFile>& inputs) const {
 }
 
 Status Outputs::check(const std::vector<NamedFile>& inputs) const {
-  if (const Status apart = check_apart(inputs); !apart) return apart;
+  TRY(check_apart(inputs));
   for (const Output& output : outputs_) {
     if (is_standard_output(output.file.path)) continue;
-    if (const Status writable = check_writable(output.file.path); !writable) return writable;
+    TRY(check_writable(output.file.path));
   }
   return {};
 }
@@ -131,7 +131,7 @@ Status Outputs::write() const {
   for (const Output& output : outputs_) {
     if (output.text && output.file.path != "-") files.push_back({output.file.path, *output.text});
   }
-  if (const Status written = write_text_files(files); !written) return written;
+  TRY(write_text_files(files));
   for (const Output& output : outputs_) {
     if (output.text && output.file.path == "-") return write_output("-", *output.text);
   }

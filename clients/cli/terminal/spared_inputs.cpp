@@ -136,9 +136,9 @@ Status check_outputs(const CLI::App& command) {
     apart.add(output.option, output.path, replaces);
     if (!comes_into(made, output.path)) outputs.add(output.option, output.path, replaces);
   }
-  if (const Status spared = apart.check_apart(inputs); !spared) return spared;
+  TRY(apart.check_apart(inputs));
   if (!made.empty()) {
-    if (const Status can_be = check_can_be_made(made); !can_be) return can_be;
+    TRY(check_can_be_made(made));
   }
   return outputs.check(inputs);
 }

@@ -135,10 +135,10 @@ Status locate_unknown_frames(PhysicalModel& model, const MeasurementBatch& batch
     const ToolPoses poses = poses_of(tool, batch, cell.robot);
     if (poses.points_W.empty() || (known && base_known)) continue;
     if (known) {
-      if (const Status located = locate_base(poses, *known, model); !located) return located;
+      TRY(locate_base(poses, *known, model));
     } else if (base_known) {
       const auto locate = has_base(model) ? locate_tool_near : locate_tool_at;
-      if (const Status located = locate(poses, model.tools[tool], model); !located) return located;
+      TRY(locate(poses, model.tools[tool], model));
     } else {
       const BaseAndTool found = TRY(locate_both(poses));
       model.X_WB = found.X_WB;

@@ -28,7 +28,7 @@ Status check_batch_ids(std::string_view ids) {
   for (bool is_last = false; !is_last;) {
     const std::size_t end = ids.find(kJoins);
     is_last = end == std::string_view::npos;
-    if (const Status fine = check_name(ids.substr(0, end), "batch_id"); !fine) return fine;
+    TRY(check_name(ids.substr(0, end), "batch_id"));
     if (++batches > kMostBatches)
       return failure(ErrorCode::kTooLarge, "batch_id of more than {} batches, its limit", kMostBatches)
           .of("batch_id")
@@ -49,15 +49,15 @@ Status check_all(const Json& json, const std::string& key) {
   if (json.is_array()) {
     for (const Json& one : json) {
       if (!one.is_string() && !one.is_structured()) continue;  // most are numbers
-      if (Status fine = check_all(one, key); !fine) return fine;
+      TRY(check_all(one, key));
     }
   }
   if (!json.is_object()) return {};
   static const std::set<std::string, std::less<>> kReadElsewhere = {"cell_yaml", "error_sources", "robot_yaml"};
   for (const auto& [name, one] : json.items()) {
-    if (Status fine = check_name(name, "key"); !fine) return fine;
+    TRY(check_name(name, "key"));
     if (kReadElsewhere.contains(name)) continue;
-    if (Status fine = check_all(one, name); !fine) return fine;
+    TRY(check_all(one, name));
   }
   return {};
 }

@@ -200,7 +200,7 @@ Status read_parameters(const Json& content, const std::string& where, ModelParts
 
 Status read_calibration(const Json& content, const std::string& where, ModelParts& parts) {
   parts.covariance = matrix_from(content.at("covariance"));
-  if (Status read = read_parameters(content, where, parts); !read) return read;
+  TRY(read_parameters(content, where, parts));
   for (const Json& u : list_from(content.at("unidentifiable"))) {
     parts.unidentifiable.push_back({.singular_value = number_from(u, "singular_value"),
                                     .parameters = u.at("parameters"),
@@ -276,7 +276,7 @@ Status read_bias(const Json& content, const std::string& where, ModelParts& part
   if (content.contains("bias_choice")) parts.bias_choice = choice_from(content.at("bias_choice"));
   if (!content.contains("bias")) return {};
   parts.bias = bias_from(content.at("bias"));
-  if (Status read = read_bias_contexts(content.at("bias"), where, parts); !read) return read;
+  TRY(read_bias_contexts(content.at("bias"), where, parts));
   if (content.contains("rotation_bias")) parts.rotation_bias = bias_from(content.at("rotation_bias"));
   if (content.contains("bias_origin")) {
     Result<ModelParts::BiasOrigin> origin = origin_from(content.at("bias_origin"), parts.physics.cell);

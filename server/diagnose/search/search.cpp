@@ -494,7 +494,7 @@ Status Search::open_wrong_signs() {
     }
   }
   for (const Accepted& one : std::exchange(wrong_, {})) {
-    if (const Status asked = ask_again_for(one); !asked) return asked;
+    TRY(ask_again_for(one));
   }
   return {};
 }

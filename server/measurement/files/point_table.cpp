@@ -61,10 +61,10 @@ Status read_unit_statements(const std::string& comment, const std::string& where
   for (auto at = std::sregex_iterator(comment.begin(), comment.end(), kUnits); at != std::sregex_iterator(); ++at) {
     if ((*at)[1].matched) {
       const bool radians = TRY(is_radian((*at)[2], where, line));
-      if (const Status s = state(statements.radians, radians, where, "angular unit"); !s) return s;
+      TRY(state(statements.radians, radians, where, "angular unit"));
     } else {
       const LengthUnit unit = TRY(length_unit((*at)[2], where, line));
-      if (const Status s = state(statements.unit, unit, where, "unit"); !s) return s;
+      TRY(state(statements.unit, unit, where, "unit"));
     }
   }
   return {};
@@ -75,13 +75,13 @@ Status read_statements(const TextLine& line, const std::string& where, Statement
   static const std::regex kZyx(R"(\bzyx\s+euler|\beuler\s+(angles\s+)?\(?zyx)"), kEuler(R"(\beuler\b)");
   static const std::regex kFixed(R"(\bfixed\s+(xyz|angles)|\bxyz\s+fixed)"), kUncertain("\\buncertaint");
   const std::string comment = words_of(line.text);
-  if (const Status units = read_unit_statements(comment, where, line.number, statements); !units) return units;
+  TRY(read_unit_statements(comment, where, line.number, statements));
   const auto coordinates = contains(comment, kCylindric)   ? std::optional(Coordinates::kCylindrical)
                            : contains(comment, kSpherical) ? std::optional(Coordinates::kSpherical)
                            : contains(comment, kCartesian) ? std::optional(Coordinates::kCartesian)
                                                            : std::nullopt;
   if (coordinates) {
-    if (const Status s = state(statements.coordinates, *coordinates, where, "coordinates"); !s) return s;
+    TRY(state(statements.coordinates, *coordinates, where, "coordinates"));
   }
   const bool zyx = contains(comment, kZyx);
   if (!zyx && contains(comment, kEuler)) {
@@ -187,10 +187,10 @@ Status read_header_units(const Header& header, const std::string& where, int lin
     if (header.units[k].empty()) continue;
     if (is_angle(header.columns[k])) {
       const bool radians = TRY(is_radian(header.units[k], where, line));
-      if (const Status s = state(statements.radians, radians, where, "angular unit"); !s) return s;
+      TRY(state(statements.radians, radians, where, "angular unit"));
     } else {
       const LengthUnit unit = TRY(length_unit(header.units[k], where, line));
-      if (const Status s = state(statements.unit, unit, where, "unit"); !s) return s;
+      TRY(state(statements.unit, unit, where, "unit"));
     }
   }
   return {};

@@ -169,9 +169,9 @@ class NamedColumns {
          {Orientation::kRxRyRz, {"rx", "ry", "rz"}}}};
     for (const auto& [kind, names] : kinds) {
       std::vector<ScaledColumn> angles;
-      if (const Status three = find_three(names, "deg", angles); !three) return three;
+      TRY(find_three(names, "deg", angles));
       if (angles.empty()) continue;
-      if (const Status one = set_orientation(kind); !one) return one;
+      TRY(set_orientation(kind));
       found_.angles = std::move(angles);
     }
     for (const char* name : {"qw", "qx", "qy", "qz"}) {

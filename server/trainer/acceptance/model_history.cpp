@@ -140,7 +140,7 @@ Status ModelHistory::activate(const std::string& cell, int version, const Change
   const auto made_meanwhile = TRY(store_.outcome_of(id));
   if (made_meanwhile) return {};
   const std::optional<JobOutcome> figures = judged ? std::optional(outcome_of(*judged)) : std::nullopt;
-  if (auto activated = store_.activate(cell, version, id, figures); !activated) return activated;
+  TRY(store_.activate(cell, version, id, figures));
   if (registry_.version_in_force(cell) != version) put_in_force(std::move(model));
   return {};
 }

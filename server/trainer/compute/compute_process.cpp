@@ -131,7 +131,7 @@ Status ComputeProcess::send(const Frame& frame) {
     if (n >= 0) {
       sent += static_cast<std::size_t>(n);
     } else if (errno == EAGAIN || errno == EINTR) {
-      if (const Status ready = wait(POLLOUT); !ready) return ready;
+      TRY(wait(POLLOUT));
     } else {
       return crashed();
     }
@@ -190,7 +190,7 @@ Status ComputeProcess::wait(short events) {
     if (wake_->is_asked()) return broken(Breakdown::Kind::kStopped, given_up());
     if (Clock::now() >= next_tick_) {
       next_tick_ = Clock::now() + kTick;
-      if (const Status well = look_after(); !well) return well;
+      TRY(look_after());
     }
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(next_tick_ - Clock::now());
     std::array<pollfd, 4> polled = {{{child_->channel(), events, 0},

@@ -46,13 +46,13 @@ std::vector<std::string> names_of(const CompensatedModel& model) {
 
 Status check_may_start_from(const CompensatedModel& from, const Cell& cell, const MeasurementBatch& batch,
                             const std::vector<std::string>& only) {
-  if (const Status positions = require_positions(batch, "identifying anew in a model"); !positions) return positions;
+  TRY(require_positions(batch, "identifying anew in a model"));
   const PhysicalModel& model = from.parts().physics;
   if (model.cell->robot_yaml != cell.robot_yaml) {
     return refused("the model to start from is of another robot than cell {}", cell.name).in("batch " + batch.id);
   }
   if (!corrects(only, causes::Part::kBase)) {
-    if (const Status same = check_same_frame(cell, "its base", cell.X_WB, model.X_WB, "base"); !same) return same;
+    TRY(check_same_frame(cell, "its base", cell.X_WB, model.X_WB, "base"));
   }
   for (const auto& [name, kept] : model.tools) {
     const auto said = cell.tools.find(name);
