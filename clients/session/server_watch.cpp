@@ -20,12 +20,12 @@ Result<std::unique_ptr<ServerWatch>> ServerWatch::open(wire::dds::DomainParticip
         self->on_status(sample, writer, written);
       }));
   watch->status_reader_ = std::move(status);
-  auto old_status = TRY(wire::StateReader<wire::OldServiceStatusTopic>::open(
-      wire::make_old_status_topic(participant), subscriber, wire::state_reader_qos(),
-      [self](const contract_1::ServiceStatus* sample, const std::string& writer, double) {
-        self->on_old_status(sample, writer);
+  auto contract = TRY(wire::StateReader<wire::SpokenContractTopic>::open(
+      wire::make_contract_topic(participant), subscriber, wire::state_reader_qos(),
+      [self](const wire::SpokenContract* sample, const std::string& writer, double) {
+        self->on_contract(sample, writer);
       }));
-  watch->old_status_reader_ = std::move(old_status);
+  watch->contract_reader_ = std::move(contract);
   auto model = TRY(wire::StateReader<wire::ModelStatusTopic>::open(
       participant, subscriber, wire::state_reader_qos(),
       [self](const wire::ModelStatus* sample, const std::string& writer, double written) {
@@ -197,13 +197,14 @@ std::optional<wire::Job> ServerWatch::wait_for_progress(const std::string& serve
   return news;
 }
 
-void ServerWatch::on_old_status(const contract_1::ServiceStatus* status, const std::string& participant) {
+void ServerWatch::on_contract(const wire::SpokenContract* spoken, const std::string& participant) {
   {
     const MutexLock lock(mutex_);
-    if (status == nullptr) {
+    if (spoken == nullptr) {
       others_.erase(participant);
-    } else if (status->contract_version() != wire::CONTRACT_VERSION) {
-      others_[participant] = {status->server().to_string(), status->program_version(), status->contract_version()};
+    } else if (spoken->contract_version() != wire::CONTRACT_VERSION) {
+      others_[participant] = {spoken->server().to_string(), spoken->program_version().to_string(),
+                              spoken->contract_version()};
       if (!others_since_) others_since_ = Clock::now();
     }
     if (others_.empty()) others_since_.reset();

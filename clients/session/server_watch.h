@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "idl/contract_1.h"
+#include "idl/contract.h"
 #include "idl/state_reader.h"
 #include "idl/transport.h"
 #include "server/base/mutex.h"
@@ -86,7 +86,7 @@ class ServerWatch {
 
  private:
   explicit ServerWatch(std::size_t named) : named_(named) {}
-  void on_old_status(const contract_1::ServiceStatus* status, const std::string& participant);
+  void on_contract(const wire::SpokenContract* spoken, const std::string& participant);
   /// Whether waiting for a server is in vain: those that are there speak another contract, and have been for a while.
   [[nodiscard]] bool in_vain() const TRAMMEL_REQUIRES(mutex_);
   /// Waits until `found`, and gives up at `deadline` or when it is in vain.
@@ -119,7 +119,7 @@ class ServerWatch {
       TRAMMEL_GUARDED_BY(mutex_);  // by number, then by server
   std::uint64_t progress_count_ TRAMMEL_GUARDED_BY(mutex_) = 0;
   std::unique_ptr<wire::StateReader<wire::ServiceStatusTopic>> status_reader_;
-  std::unique_ptr<wire::StateReader<wire::OldServiceStatusTopic>> old_status_reader_;
+  std::unique_ptr<wire::StateReader<wire::SpokenContractTopic>> contract_reader_;
   std::unique_ptr<wire::StateReader<wire::ModelStatusTopic>> model_reader_;
   std::unique_ptr<wire::StateReader<wire::TrainingProgressTopic>> progress_reader_;
 };

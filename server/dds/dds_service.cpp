@@ -20,7 +20,6 @@
 #include "server/base/mutex.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"
-#include "server/dds/old_contract.h"
 #include "server/dds/packet_report.h"
 #include "server/dds/port_lock.h"
 #include "server/dds/reply_channels.h"
@@ -176,7 +175,6 @@ class DdsService::Running {
     tell_refused(Clock::now() + PacketReport::kAtMostEvery);  // also what would have been told later
     publish_status(wire::SERVICE_STOPPING);
     for (const auto& endpoint : endpoints_) endpoint->close();
-    old_contract_.reset();
     for (Lane* lane : lanes()) lane->stop();
     replies_thread_ = {};
     endpoints_.clear();
@@ -286,8 +284,6 @@ class DdsService::Running {
     if (opened && options_.ros2) opened = open_ros2<wire::Ros2PredictErrors>(predictions_);
     if (opened && options_.ros2) opened = open_ros2<wire::Ros2CorrectTargets>(corrections_);
     if (!opened) return opened;
-    auto old = TRY(OldContract::open(options_.server_id, *participant_, core_.subscriber, channels_));
-    old_contract_ = std::move(old);
     return {};
   }
 
@@ -395,7 +391,6 @@ class DdsService::Running {
   std::map<std::string, Mutex> publishing_
       TRAMMEL_GUARDED_BY(publishing_mutex_);  // by cell, nothing leaves it; a cell publishes one model at a time
   std::vector<std::unique_ptr<RequestEndpointBase>> endpoints_;
-  std::unique_ptr<OldContract> old_contract_;
   std::atomic<std::uint64_t> status_steps_{0};
   std::shared_ptr<const wire::DropCounts> dropped_;
   std::optional<PacketReport> packets_;  // of the status thread

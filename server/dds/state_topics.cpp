@@ -1,6 +1,6 @@
 #include "server/dds/state_topics.h"
 
-#include "idl/contract_1.h"
+#include "idl/contract.h"
 #include "server/dds/codec.h"
 
 namespace trammel {
@@ -14,21 +14,6 @@ Status open_writer(const Result<wire::dds::Topic*>& topic, wire::dds::Publisher&
   return {};
 }
 
-/// As far as contract 1 has it.
-contract_1::ServiceStatus in_old_words(const wire::ServiceStatus& status) {
-  contract_1::ServiceStatus old;
-  old.server(status.server());
-  old.contract_version(status.contract_version());
-  old.program_version(status.program_version());
-  old.state(status.state());
-  old.cells(status.cells());
-  old.requests(status.requests());
-  old.refused(status.refused());
-  old.uptime_s(status.uptime_s());
-  old.queued_jobs(status.queued_jobs());
-  return old;
-}
-
 }  // namespace
 
 Result<StateTopics> StateTopics::open(wire::dds::DomainParticipant& participant) {
@@ -38,8 +23,8 @@ Result<StateTopics> StateTopics::open(wire::dds::DomainParticipant& participant)
   Status opened = open_writer(wire::make_state_topic<wire::ServiceStatusTopic>(participant), *publisher,
                               wire::service_status_writer_qos(), topics.service_status_);
   if (opened) {
-    opened = open_writer(wire::make_old_status_topic(participant), *publisher, wire::service_status_writer_qos(),
-                         topics.old_service_status_);
+    opened = open_writer(wire::make_contract_topic(participant), *publisher, wire::service_status_writer_qos(),
+                         topics.contract_);
   }
   if (opened) {
     opened = open_writer(wire::make_state_topic<wire::TrainingProgressTopic>(participant), *publisher,
@@ -54,8 +39,11 @@ Result<StateTopics> StateTopics::open(wire::dds::DomainParticipant& participant)
 }
 
 void StateTopics::publish(wire::ServiceStatus status) {
-  contract_1::ServiceStatus old = in_old_words(status);
-  old_service_status_->write(&old);
+  wire::SpokenContract contract;
+  contract.server(status.server());
+  contract.contract_version(status.contract_version());
+  contract.program_version(status.program_version());
+  contract_->write(&contract);
   service_status_->write(&status);
 }
 

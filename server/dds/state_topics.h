@@ -14,7 +14,7 @@ class StateTopics {
 
   [[nodiscard]] const wire::dds::DataWriter& status_writer() const { return *service_status_; }
 
-  /// Writes it for clients of every contract.
+  /// Writes it, and the contract for clients of every contract.
   void publish(wire::ServiceStatus status);
   void publish(wire::TrainingProgress progress);
   /// Writes ModelStatus.
@@ -23,7 +23,7 @@ class StateTopics {
  private:
   StateTopics() = default;
   wire::dds::DataWriter* service_status_ = nullptr;
-  wire::dds::DataWriter* old_service_status_ = nullptr;
+  wire::dds::DataWriter* contract_ = nullptr;
   wire::dds::DataWriter* training_progress_ = nullptr;
   wire::dds::DataWriter* model_status_ = nullptr;
 };

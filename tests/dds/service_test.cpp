@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "clients/session/session.h"
-#include "idl/contract_1.h"
+#include "idl/contract.h"
 #include "server/dds/dds_service.h"
 #include "tests/dds/backend.h"
 #include "tests/dds/raw_client.h"
@@ -376,8 +376,8 @@ TEST_F(ServiceTest, AServerOfAnotherContractIsNamedByTheClientThatFindsNoOther) 
     auto other = wire::make_participant({"another server", options.domain, options.address, options.port, {}}).value();
     wire::dds::DataWriter* writer =
         other->create_publisher(wire::publisher_qos({}))
-            ->create_datawriter(wire::make_old_status_topic(*other).value(), wire::service_status_writer_qos());
-    contract_1::ServiceStatus status;
+            ->create_datawriter(wire::make_contract_topic(*other).value(), wire::service_status_writer_qos());
+    wire::SpokenContract status;
     status.server("elder");
     status.contract_version(contract);
     status.program_version("9.9");
@@ -391,96 +391,6 @@ TEST_F(ServiceTest, AServerOfAnotherContractIsNamedByTheClientThatFindsNoOther) 
     EXPECT_EQ(session->predict_error(kCell7, {kJoints}).error().field, "contract_version");
     other.reset();
   }
-}
-
-/// What a client of contract 1 sends: a header as it was, and whatever followed.
-template <typename Old>
-class OldClient final : private wire::dds::DataReaderListener, private wire::dds::DataWriterListener {
- public:
-  using Reply = typename Old::Reply::type;
-
-  explicit OldClient(const DdsOptions& options)
-      : participant_(
-            wire::make_participant({"old client", options.domain, options.address, 0, {options.port}}).value()) {
-    const std::string name = Old::kName;
-    wire::dds::TypeSupport type(new test::AnyBytesType(wire::old_type_name(name + "Request")));
-    type.register_type(participant_.get());
-    auto* requests = participant_->create_topic(name + "_Request", type.get_type_name(), wire::dds::TOPIC_QOS_DEFAULT);
-    auto* replies = wire::make_old_reply_topic<Old>(*participant_).value();
-    const auto heard = wire::dds::StatusMask::data_available() << wire::dds::StatusMask::subscription_matched();
-    participant_->create_subscriber(wire::subscriber_qos("old-1"))
-        ->create_datareader(replies, wire::call_reader_qos(4), this, heard);
-    writer_ =
-        participant_->create_publisher(wire::publisher_qos({}))
-            ->create_datawriter(requests, wire::call_writer_qos(4), this, wire::dds::StatusMask::publication_matched());
-  }
-  ~OldClient() override { participant_.reset(); }
-  OldClient(const OldClient&) = delete;
-  OldClient& operator=(const OldClient&) = delete;
-
-  /// The answer to a request with `rest` behind its header.
-  [[nodiscard]] std::optional<Reply> ask(std::size_t rest) {
-    std::unique_lock lock(mutex_);
-    if (!changed_.wait_for(lock, kLimit, [&] { return there_ > 0 && back_ > 0; })) return std::nullopt;
-    contract_1::Request request;
-    request.request_id().sequence_number(4711);
-    request.reply_partition("old-1");
-    request.contract_version(1);
-    test::Bytes bytes = test::to_bytes<contract_1::RequestPubSubType>(request);
-    bytes.resize(bytes.size() + rest, 7);
-    writer_->write(&bytes);
-    changed_.wait_for(lock, kLimit, [&] { return reply_.has_value(); });
-    return reply_;
-  }
-
- private:
-  void on_publication_matched(wire::dds::DataWriter*, const wire::dds::PublicationMatchedStatus& status) override {
-    const std::lock_guard lock(mutex_);
-    there_ = status.current_count;
-    changed_.notify_all();
-  }
-  void on_subscription_matched(wire::dds::DataReader*, const wire::dds::SubscriptionMatchedStatus& status) override {
-    const std::lock_guard lock(mutex_);
-    back_ = status.current_count;
-    changed_.notify_all();
-  }
-  void on_data_available(wire::dds::DataReader* reader) override {
-    Reply reply;
-    wire::dds::SampleInfo info;
-    while (reader->take_next_sample(&reply, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
-      const std::lock_guard lock(mutex_);
-      reply_ = reply;
-      changed_.notify_all();
-    }
-  }
-
-  wire::ParticipantPtr participant_;
-  wire::dds::DataWriter* writer_ = nullptr;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  int there_ = 0, back_ = 0;    // guarded by mutex_
-  std::optional<Reply> reply_;  // guarded by mutex_
-};
-
-template <typename Old>
-void expect_told(const DdsOptions& options) {
-  OldClient<Old> client(options);
-  const auto reply = client.ask(1000);
-  ASSERT_TRUE(reply) << Old::kName;
-  EXPECT_EQ(reply->header().result(), contract_1::RESULT_WRONG_CONTRACT) << Old::kName;
-  EXPECT_EQ(reply->header().related_request_id().sequence_number(), 4711) << Old::kName;
-  EXPECT_EQ(reply->header().contract_version(), wire::CONTRACT_VERSION) << Old::kName;
-  EXPECT_NE(reply->header().message().find("update the client"), std::string::npos) << reply->header().message();
-}
-
-TEST_F(ServiceTest, AClientOfContract1IsToldOnEveryTopicOfItsOwn) {
-  server_.start();
-  expect_told<wire::OldPredictError>(server_.options());
-  expect_told<wire::OldCorrectTarget>(server_.options());
-  expect_told<wire::OldSubmitMeasurements>(server_.options());
-  expect_told<wire::OldTrain>(server_.options());
-  expect_told<wire::OldDiagnose>(server_.options());
-  expect_told<wire::OldManageModels>(server_.options());
 }
 
 TEST_F(ServiceTest, HostileSamplesDoNotStopAReader) {

@@ -57,17 +57,6 @@ TEST_F(Interoperability, ACycloneDdsClientThatIsStartedAgainIsAnsweredInTheParti
   }
 }
 
-TEST_F(Interoperability, AClientOfTheContractBeforeIsToldThatItMustBeUpdated) {
-  const test::Finished client = run(TRAMMEL_CYCLONE_CLIENT_1, options_.domain, "20");
-  EXPECT_EQ(client.exit_code, 0) << client.err;
-  EXPECT_EQ(
-      client.out,
-      "server=server-a contract=2 cells=2\n"
-      "predict: result=12 id=4711 contract=2 items=0: the request is of contract 1, this server speaks contract 2: "
-      "update the client\n"
-      "list: result=12 models=0\n");
-}
-
 /// The same server where ROS 2 nodes are answered, too.
 class Ros2 : public Interoperability {
  protected:

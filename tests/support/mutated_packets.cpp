@@ -27,7 +27,7 @@ bool MutatedPackets::collect() {
   if (!participant_.meet(std::chrono::seconds(20))) return false;
   std::uint32_t entity = kWriter;
   std::int64_t number = 0;
-  for (const char* topic : {"PredictError_2_Request", "ManageModels_2_Request", "ServiceStatus"}) {
+  for (const char* topic : {"PredictError_2_Request", "ManageModels_2_Request", "SpokenContract"}) {
     const ParameterList list = participant_.endpoint(entity += 0x100, topic, std::string("trammel::wire::") + topic);
     const PacketBytes packet =
         participant_.packet().data({kPublicationsReader, kPublicationsId, ++number, {}, list.payload()}).bytes();
