@@ -22,39 +22,31 @@ namespace {
 
 using Json = nlohmann::json;
 using model_file::kFormat;
-using model_file::kOldestFormat;
 using Members = std::map<std::string, std::string_view>;
 
 /// Text of a file as a message may show it.
 std::string excerpt(std::string_view text) { return shown_short(text, 120); }
 
-/// The format that the file says it has.
-Result<int> format_of(const Members& members, const std::string& where) {
+/// Whether the file is of the format that is read.
+Status check_format(const Members& members, const std::string& where) {
   const auto said = members.find("trammel_model");
   if (said == members.end()) return refused("not a Trammel model: no trammel_model").in(where).of("trammel_model");
-  for (int format = kOldestFormat; format <= kFormat; ++format) {
-    if (said->second == std::to_string(format)) return format;
-  }
-  return refused("model format {}, this program reads {} to {}", excerpt(said->second), kOldestFormat, kFormat)
+  if (said->second == std::to_string(kFormat)) return {};
+  return refused("model format {}, this program reads {}", excerpt(said->second), kFormat)
       .in(where)
       .of("trammel_model")
       .with_text(excerpt(said->second));
 }
 
 /// Whether the outermost keys are there, and no others: a damaged key must not pass for a missing one.
-Status check_keys(const Members& members, int format, const std::string& where) {
-  static const std::set<std::string_view> kAlways = {"content", "hash", "stamp", "trammel_model"};
-  // The oldest were written before the stamp was hashed.
-  static const std::set<std::string_view> kSince = {"stamp_hash", "self_test", "self_test_hash"};
-  const auto taken = [&](std::string_view key) {
-    return kAlways.contains(key) || (format == kOldestFormat ? key == "stamp_hash" : kSince.contains(key));
-  };
+Status check_keys(const Members& members, const std::string& where) {
+  static const std::set<std::string_view> kKeys = {"content", "hash",       "self_test",    "self_test_hash",
+                                                   "stamp",   "stamp_hash", "trammel_model"};
   for (const auto& [key, value] : members) {
-    if (!taken(key)) return refused("not a Trammel model: unknown key {}", excerpt(key)).in(where).of(excerpt(key));
+    if (!kKeys.contains(key))
+      return refused("not a Trammel model: unknown key {}", excerpt(key)).in(where).of(excerpt(key));
   }
-  std::set<std::string_view> wanted = kAlways;
-  if (format > kOldestFormat) wanted.insert(kSince.begin(), kSince.end());
-  for (const std::string_view key : wanted) {
+  for (const std::string_view key : kKeys) {
     if (!members.contains(std::string(key)))
       return refused("not a Trammel model: no {}", key).in(where).of(std::string(key));
   }
@@ -70,21 +62,11 @@ Status check_hash(const Members& members, const std::string& of, const std::stri
 
 /// Whether no byte was changed since the file was written. Looks at the bytes, before anything is made of them.
 Status check_undamaged(const Members& members, const std::string& where) {
-  const int format = TRY(format_of(members, where));
-  Status fine = check_keys(members, format, where);
-  if (fine) fine = check_hash(members, "content", "hash", where);
-  for (const char* part : {"stamp", "self_test"}) {
-    const std::string by = fmt::format("{}_hash", part);
-    if (fine && members.contains(by)) fine = check_hash(members, part, by, where);
-  }
-  return fine;
-}
-
-/// Whether it predicts as it did.
-Status check_predictions(const CompensatedModel& model, const Members& members) {
-  const auto self_test = members.find("self_test");
-  return self_test == members.end() ? model_file::check_predicts(model)
-                                    : model_file::check_self_test(model, Json::parse(self_test->second));
+  TRY(check_format(members, where));
+  TRY(check_keys(members, where));
+  TRY(check_hash(members, "content", "hash", where));
+  TRY(check_hash(members, "stamp", "stamp_hash", where));
+  return check_hash(members, "self_test", "self_test_hash", where);
 }
 
 Result<CompensatedModel> checked_model(const Members& members, const std::string& where, ModelTexts texts) {
@@ -98,7 +80,8 @@ Result<CompensatedModel> checked_model(const Members& members, const std::string
   Result<CompensatedModel> model =
       possible ? CompensatedModel::make(std::move(parts)) : tl::make_unexpected(possible.error());
   if (model) {
-    if (const Status same = check_predictions(*model, members); !same) model = tl::make_unexpected(same.error());
+    const Status same = model_file::check_self_test(*model, Json::parse(members.at("self_test")));
+    if (!same) model = tl::make_unexpected(same.error());
   }
   return std::move(model).map_error([&](Error error) { return Failure(std::move(error)).in(where).value(); });
 }

@@ -46,14 +46,6 @@ std::string spoiled(const std::function<void(json& content)>& change) {
   return file.dump();
 }
 
-/// As it was written before the stamp was hashed and a self test stated.
-std::string in_the_oldest_format() {
-  json file = json::parse(small_model_text());
-  for (const char* key : {"stamp_hash", "self_test", "self_test_hash"}) file.erase(key);
-  file["trammel_model"] = 1;
-  return file.dump();
-}
-
 Refusal refusal_with(const std::string& text) {
   const Result<CompensatedModel> model = deserialize(text, "cell.model");
   return refusal_of(model);
@@ -69,7 +61,7 @@ std::string repeated(const std::string& part, std::size_t times) {
 /// A file whose content is `content`, with the hash that fits.
 std::string file_with(const std::string& content) {
   return R"({"content":)" + content + R"(,"hash":")" + sha256_hex(content) +
-         R"(","stamp":{"program_version":"1","trained_at":1},"trammel_model":1})";
+         R"(","stamp":{"program_version":"1","trained_at":1},"trammel_model":2})";
 }
 
 Refusal too_large(double count, double limit) {
@@ -118,21 +110,15 @@ TEST(ModelFile, EveryTruncationOfASmallFileIsRefused) {
   }
 }
 
-TEST(ModelFile, OfBeforeTheStampWasHashedIsStillRead) {
-  const Result<CompensatedModel> model = deserialize(in_the_oldest_format() + "\n", "cell.model");
-  ASSERT_TRUE(model) << model.error().message;
-  EXPECT_EQ(serialize(*model), small_model_text());
-}
-
 TEST(ModelFile, NamesItsFormatInItsOwnWords) {
   json file = json::parse(small_model_text());
   file.erase("self_test");
   EXPECT_EQ(refusal_with(file.dump()), Refusal("cell.model", {}, "self_test"));
-  file = json::parse(in_the_oldest_format());
-  file["trammel_model"] = 2;
-  EXPECT_FALSE(deserialize(file.dump(), "cell.model"));
-  file["trammel_model"] = 3;
-  EXPECT_EQ(refusal_with(file.dump()), Refusal("cell.model", {}, "trammel_model").text("3"));
+  for (const char* other : {"1", "3"}) {
+    file = json::parse(small_model_text());
+    file["trammel_model"] = json::parse(other);
+    EXPECT_EQ(refusal_with(file.dump()), Refusal("cell.model", {}, "trammel_model").text(other));
+  }
 }
 
 /// The small model with `change` done to its self test, its hash fitting again.
@@ -198,8 +184,8 @@ TEST(ModelFile, AnySelfTestIsRefusedInASentence) {
             Refusal("cell.model", {}, "self_test").of(ErrorCode::kTooLarge).beyond(24, 10));
 }
 
-TEST(ModelFile, OfTheOldestFormatThatPredictsNoLengthIsRefused) {
-  json file = json::parse(in_the_oldest_format());
+TEST(ModelFile, ThatPredictsNoLengthIsRefused) {
+  json file = json::parse(small_model_text());
   file["content"]["values"]["values"][0] = 1e300;
   file["content"]["parameters"][0]["value"] = 1e300;
   file["hash"] = sha256_hex(file["content"].dump());
@@ -209,7 +195,7 @@ TEST(ModelFile, OfTheOldestFormatThatPredictsNoLengthIsRefused) {
 TEST(ModelFile, NestedAMillionDeepIsRefusedOnTheSmallestStack) {
   const std::size_t million = 1'000'000;
   for (const auto& [open, close] : std::vector<std::pair<std::string, std::string>>{{"[", "]"}, {"{\"a\":", "}"}}) {
-    const std::string unclosed = R"({"trammel_model":1,"content":)" + repeated(open, million);
+    const std::string unclosed = R"({"trammel_model":2,"content":)" + repeated(open, million);
     EXPECT_EQ(refusal_on_a_small_stack(unclosed), too_large(17, 16));
     const std::string closed = file_with(repeated(open, million) + (open == "[" ? "" : "1") + repeated(close, million));
     EXPECT_EQ(refusal_on_a_small_stack(closed), too_large(17, 16));

@@ -1011,7 +1011,7 @@ TEST_F(CommandLineWithService, WhatTheServiceRefusesEndsWith3AndItsReason) {
 
 TEST_F(CommandLine, NoBytesOfAModelFileEndTheProgram) {
   const std::string deep =
-      folder_.write("deep.model", R"({"trammel_model":1,"content":)" + std::string(1'000'000, '['));
+      folder_.write("deep.model", R"({"trammel_model":2,"content":)" + std::string(1'000'000, '['));
   const std::string brackets = folder_.write("brackets.model", std::string(30'000'000, '['));
   const std::string batch = folder_.write("b.csv", "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,x_mm,y_mm,z_mm\n");
   for (const std::string& model : {deep, brackets, std::string("/dev/zero")}) {

@@ -189,7 +189,7 @@ TEST_F(DaemonTest, ASecondOneOnTheSameStoreOrPortOrOfTheSameNameIsRefused) {
 TEST_F(DaemonTest, AnImportOfAnyBytesIsRefusedAndTheDaemonGoesOn) {
   wait_for(submit("lt-07", 60));
   const client::ModelInfo before = model();
-  const std::string head = R"({"trammel_model":1,"content":)";
+  const std::string head = R"({"trammel_model":2,"content":)";
   for (const std::string& text : {head + std::string(1'000'000, '['), std::string(30'000'000, '['), std::string("{}"),
                                   head + "{\"a\":" + std::string(20'000'000, '7') + "}}"}) {
     const auto imported = session_->import_model("cell-7", text);

@@ -278,11 +278,8 @@ std::string mutate_model(const std::string& input, Random& random, std::size_t l
   if (file.is_discarded() || !file.is_object()) return mutate_text(input, random, longest);
   change_tree(below(8, random) == 0 || !file.contains("content") ? file : file["content"], random);
   if (!file.is_object()) return dumped(file);
-  // The old format states no predictions, so that a model that predicts otherwise is read to its end.
-  if (below(2, random) == 0) {
-    for (const char* key : {"self_test", "self_test_hash"}) file.erase(key);
-    file["trammel_model"] = 1;
-  }
+  // Without stated predictions a model that predicts otherwise is read to its end.
+  if (below(2, random) == 0) file["self_test"] = Json::array();
   if (below(32, random) != 0) make_hashes_fit(file);
   return cut(dumped(file), longest);
 }

@@ -134,11 +134,4 @@ Status check_self_test(const CompensatedModel& model, const Json& self_test) {
   return {};
 }
 
-Status check_predicts(const CompensatedModel& model) {
-  for (const TestPose& pose : test_poses(model)) {
-    if (!possible(predict(model, pose))) return impossible();
-  }
-  return {};
-}
-
 }  // namespace trammel::model_file

@@ -23,7 +23,4 @@ constexpr double kStatedMoreShare = 0.03;
 /// Whether the model predicts what `self_test` states. Throws exceptions of nlohmann as parts_from() does.
 [[nodiscard]] Status check_self_test(const CompensatedModel& model, const nlohmann::json& self_test);
 
-/// Whether the model predicts numbers at all; for files from before they stated a self test.
-[[nodiscard]] Status check_predicts(const CompensatedModel& model);
-
 }  // namespace trammel::model_file
