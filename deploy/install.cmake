@@ -43,7 +43,7 @@ endif()
 set(common_rooms headers base)
 set(session_rooms idl_types idl clients_session)
 set(offline_rooms numerics robot error_sources measurement calibrate bias plan simulate compensate diagnose health fleet store registry report
-  trainer offline)
+  tasks trainer offline)
 
 set_target_properties(trammel_clients_session PROPERTIES EXPORT_NAME session)
 foreach(component common session offline)

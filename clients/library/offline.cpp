@@ -26,9 +26,9 @@
 #include "server/report/diagnosis_json.h"
 #include "server/robot/inverse_kinematics.h"
 #include "server/simulate/simulate.h"
-#include "server/trainer/pipeline/extend.h"
-#include "server/trainer/pipeline/first_batch.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/extend.h"
+#include "server/tasks/train/first_batch.h"
+#include "server/tasks/train/train.h"
 
 namespace trammel::api {
 

@@ -23,9 +23,6 @@ std::size_t bytes_at_flange(std::size_t poses) {
 
 }  // namespace
 
-ServedModel::ServedModel(std::string of_cell, int of_version, CompensatedModel served)
-    : cell(std::move(of_cell)), version(of_version), model(std::move(served)), notes(notes_of(model)) {}
-
 std::size_t bytes_of(const CompensatedModel& model) {
   if (!model.bias()) return kRest;
   const auto poses = static_cast<std::size_t>(model.bias()->state().q.rows());

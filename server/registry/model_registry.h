@@ -12,24 +12,11 @@
 #include <vector>
 
 #include "server/base/mutex.h"
-#include "server/base/note.h"
 #include "server/base/result.h"
-#include "server/compensate/compensated_model.h"
+#include "server/compensate/served_model.h"
 #include "server/registry/reclaimer.h"
 
 namespace trammel {
-
-/// A model with its place in the cell's history.
-struct ServedModel {
-  ServedModel(std::string cell, int version, CompensatedModel model);
-
-  std::string cell;
-  int version = 0;
-  CompensatedModel model;
-  std::vector<Note> notes;  ///< notes_of(model): each answer carries them
-};
-
-using ServedModelPtr = std::shared_ptr<const ServedModel>;
 
 /// Memory of what predicts, bytes, as far as it grows with the training poses.
 [[nodiscard]] std::size_t bytes_of(const CompensatedModel& model);

@@ -1,7 +1,7 @@
 #include "server/trainer/dark_cells.h"
 
 #include "server/store/served_models.h"
-#include "server/trainer/acceptance/fits_cell.h"
+#include "server/tasks/accept/fits_cell.h"
 
 namespace trammel {
 namespace {

@@ -9,8 +9,8 @@
 #include "server/compensate/model_file.h"
 #include "server/report/health_json.h"
 #include "server/robot/cell_rules.h"
+#include "server/tasks/train/given_up.h"
 #include "server/trainer/job_sources.h"
-#include "server/trainer/pipeline/given_up.h"
 
 namespace trammel {
 

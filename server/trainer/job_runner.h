@@ -9,10 +9,10 @@
 
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
-#include "server/trainer/acceptance/model_history.h"
 #include "server/trainer/cell_book.h"
 #include "server/trainer/compute/compute_process.h"
 #include "server/trainer/job_progress.h"
+#include "server/trainer/model_history.h"
 #include "server/trainer/trainer_options.h"
 
 namespace trammel {

@@ -17,8 +17,8 @@
 #include "server/bias/kernels/kernel_spelling.h"
 #include "server/compensate/model_file.h"
 #include "server/error_sources/spelling.h"
-#include "server/trainer/acceptance/judging.h"
-#include "server/trainer/acceptance/verdict.h"
+#include "server/tasks/accept/judging.h"
+#include "server/tasks/accept/verdict.h"
 #include "server/trainer/compute/job_batches.h"
 #include "server/trainer/job_sources.h"
 

@@ -13,11 +13,11 @@
 #include "server/base/mutex.h"
 #include "server/registry/model_registry.h"
 #include "server/store/store.h"
-#include "server/trainer/acceptance/model_history.h"
 #include "server/trainer/cell_book.h"
 #include "server/trainer/job_progress.h"
 #include "server/trainer/job_queue.h"
 #include "server/trainer/job_runner.h"
+#include "server/trainer/model_history.h"
 #include "server/trainer/presence.h"
 #include "server/trainer/trainer_options.h"
 

@@ -10,7 +10,7 @@
 #include "server/base/units.h"
 #include "server/compensate/accuracy.h"
 #include "server/plan/plan.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 

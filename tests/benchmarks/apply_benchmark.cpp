@@ -13,7 +13,7 @@
 #include "server/diagnose/diagnose.h"
 #include "server/robot/cell_file.h"
 #include "server/robot/rigid_fit.h"
-#include "server/trainer/pipeline/extend.h"
+#include "server/tasks/train/extend.h"
 #include "tests/support/demand.h"
 #include "tests/support/figure.h"
 #include "tests/support/hidden_case.h"

@@ -21,7 +21,7 @@
 #include "server/bias/bias_model.h"
 #include "server/bias/process/gaussian_process.h"
 #include "server/bias/search/hyperparameter_search.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/bias/bias_data.h"
 #include "tests/support/figure.h"
 #include "tests/support/outside.h"

@@ -12,8 +12,8 @@
 #include "server/measurement/checked_batch.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/measurement/repeats.h"
-#include "server/trainer/pipeline/leftover.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/leftover.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/figure.h"
 #include "tests/support/virtual_robot.h"
 

@@ -16,7 +16,7 @@
 #include "clients/session/session.h"
 #include "server/base/units.h"
 #include "server/store/store.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/daemon.h"
 #include "tests/support/demand.h"
 #include "tests/support/figure.h"

@@ -12,7 +12,7 @@
 #include "server/base/check.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/robot/cell_file.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/figure.h"
 #include "tests/support/hidden_check.h"

@@ -11,7 +11,7 @@
 #include <iostream>
 
 #include "server/robot/rigid_fit.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/figure.h"
 #include "tests/support/hidden_check.h"

@@ -6,7 +6,7 @@
 #include <cstdio>
 
 #include "server/report/model_page.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 #include "tests/support/web_browser.h"

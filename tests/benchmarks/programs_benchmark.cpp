@@ -20,7 +20,7 @@
 #include "server/base/units.h"
 #include "server/compensate/model_file.h"
 #include "server/measurement/pose_columns.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/figure.h"
 #include "tests/support/temporary_folder.h"

@@ -14,7 +14,7 @@
 #include "server/compensate/model_file.h"
 #include "server/dds/service_events.h"
 #include "server/store/store.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/benchmarks/service_asker.h"
 #include "tests/support/daemon.h"
 #include "tests/support/demand.h"

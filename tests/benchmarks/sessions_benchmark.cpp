@@ -11,7 +11,7 @@
 #include "server/compensate/world.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/robot/rigid_fit.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/learning_cell.h"
 #include "tests/support/virtual_robot.h"

@@ -7,7 +7,7 @@
 
 #include "server/base/units.h"
 #include "server/robot/cell_file.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/figure.h"
 #include "tests/support/ur10.h"

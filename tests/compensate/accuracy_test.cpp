@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "server/measurement/checked_batch.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/from_rows.h"
 #include "tests/support/small_cell.h"
 #include "tests/support/virtual_robot.h"

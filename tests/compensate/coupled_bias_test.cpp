@@ -9,7 +9,7 @@
 #include "server/compensate/bias_physics.h"
 #include "server/compensate/compensated_model.h"
 #include "server/compensate/model_file.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/refusal.h"
 #include "tests/support/virtual_robot.h"

@@ -12,7 +12,7 @@
 #include "server/compensate/budget/budget_words.h"
 #include "server/compensate/budget/remedies.h"
 #include "server/compensate/model_file.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 
 namespace trammel {

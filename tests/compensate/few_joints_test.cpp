@@ -9,7 +9,7 @@
 #include "server/compensate/compensated_model.h"
 #include "server/measurement/checked_batch.h"
 #include "server/measurement/files/batch_file.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 
 namespace trammel {

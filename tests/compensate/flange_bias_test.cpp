@@ -6,7 +6,7 @@
 #include "server/compensate/model_file.h"
 #include "server/plan/plan.h"
 #include "server/robot/cell_file.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 

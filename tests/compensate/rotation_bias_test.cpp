@@ -5,7 +5,7 @@
 #include "server/base/hash.h"
 #include "server/base/units.h"
 #include "server/compensate/model_file.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/refusal.h"
 #include "tests/support/virtual_robot.h"

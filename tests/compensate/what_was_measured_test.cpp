@@ -11,7 +11,7 @@
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
 #include "server/plan/plan.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 

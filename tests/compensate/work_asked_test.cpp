@@ -4,7 +4,7 @@
 
 #include "server/base/units.h"
 #include "server/plan/plan.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 

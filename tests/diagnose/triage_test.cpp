@@ -6,7 +6,7 @@
 #include <random>
 
 #include "server/measurement/checked_batch.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 

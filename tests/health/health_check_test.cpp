@@ -9,7 +9,7 @@
 #include "server/base/units.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/report/health_json.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/checked_robot.h"
 #include "tests/support/demand.h"
 #include "tests/support/remastered.h"

@@ -14,7 +14,7 @@
 #include "server/report/model_poses.h"
 #include "server/report/model_promise.h"
 #include "server/report/model_scene.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/report/seen_by_browser.h"
 #include "tests/support/from_rows.h"
 #include "tests/support/small_cell.h"

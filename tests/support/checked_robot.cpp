@@ -1,7 +1,7 @@
 #include "tests/support/checked_robot.h"
 
 #include "server/plan/plan.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 
 namespace trammel::test {

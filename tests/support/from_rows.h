@@ -2,8 +2,8 @@
 
 #include "server/diagnose/diagnose.h"
 #include "server/measurement/split.h"
-#include "server/trainer/pipeline/extend.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/extend.h"
+#include "server/tasks/train/train.h"
 
 /// What programs ask of a batch that is checked, for tests that begin with rows: each checks them first, and holds out
 /// what their `set` says.

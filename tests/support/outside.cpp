@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "server/base/coverage.h"
-#include "server/trainer/pipeline/leftover.h"
+#include "server/tasks/train/leftover.h"
 #include "tests/support/demand.h"
 #include "tests/support/from_rows.h"
 

@@ -5,7 +5,7 @@
 
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 
 /// How honest a model is beyond the poses it was trained on.
 namespace trammel::test {

@@ -5,7 +5,7 @@
 #include "server/base/check.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 
 namespace trammel::test {

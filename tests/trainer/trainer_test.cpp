@@ -14,7 +14,7 @@
 #include "server/compensate/model_file.h"
 #include "server/plan/plan.h"
 #include "server/simulate/simulate.h"
-#include "server/trainer/pipeline/extend.h"
+#include "server/tasks/train/extend.h"
 #include "tests/support/from_rows.h"
 #include "tests/support/refusal.h"
 #include "tests/support/small_cell.h"

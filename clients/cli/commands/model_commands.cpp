@@ -27,9 +27,9 @@
 #include "server/report/note_json.h"
 #include "server/report/pages_beside.h"
 #include "server/robot/cell_rules.h"
-#include "server/trainer/pipeline/first_batch.h"
-#include "server/trainer/pipeline/refitted.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/first_batch.h"
+#include "server/tasks/train/refitted.h"
+#include "server/tasks/train/train.h"
 
 namespace trammel::cli {
 

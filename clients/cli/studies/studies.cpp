@@ -7,8 +7,8 @@
 #include "server/base/units.h"
 #include "server/plan/plan.h"
 #include "server/robot/inverse_kinematics.h"
-#include "server/trainer/pipeline/leftover.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/leftover.h"
+#include "server/tasks/train/train.h"
 
 namespace trammel::cli {
 

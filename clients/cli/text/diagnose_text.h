@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "server/trainer/pipeline/extend.h"
+#include "server/tasks/train/extend.h"
 
 /// A diagnosis told to a metrologist.
 namespace trammel::cli {

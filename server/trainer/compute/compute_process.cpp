@@ -13,9 +13,9 @@
 #include <functional>
 #include <utility>
 
+#include "server/tasks/train/given_up.h"
 #include "server/trainer/compute/messages.h"
 #include "server/trainer/compute/workbench.h"
-#include "server/trainer/pipeline/given_up.h"
 
 namespace trammel {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "server/trainer/acceptance/judging.h"
+#include "server/tasks/accept/judging.h"
 #include "server/trainer/compute/task.h"
 
 namespace trammel {

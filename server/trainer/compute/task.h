@@ -10,7 +10,7 @@
 #include "server/compensate/compensated_model.h"
 #include "server/fleet/fleet_prior.h"
 #include "server/store/store.h"
-#include "server/trainer/acceptance/verdict.h"
+#include "server/tasks/accept/verdict.h"
 
 /// What one job computes from and what comes of it, as values that another process can be told.
 namespace trammel {

@@ -15,12 +15,12 @@
 #include "server/report/diagnosis_page.h"
 #include "server/report/health_json.h"
 #include "server/robot/cell_rules.h"
-#include "server/trainer/acceptance/fits_cell.h"
-#include "server/trainer/acceptance/verdict.h"
-#include "server/trainer/pipeline/extend.h"
-#include "server/trainer/pipeline/first_batch.h"
-#include "server/trainer/pipeline/lasting_sources.h"
-#include "server/trainer/pipeline/successor.h"
+#include "server/tasks/accept/fits_cell.h"
+#include "server/tasks/accept/verdict.h"
+#include "server/tasks/train/extend.h"
+#include "server/tasks/train/first_batch.h"
+#include "server/tasks/train/lasting_sources.h"
+#include "server/tasks/train/successor.h"
 
 namespace trammel {
 

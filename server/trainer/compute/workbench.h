@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "server/registry/model_registry.h"
+#include "server/tasks/train/successor.h"
+#include "server/tasks/train/train.h"
 #include "server/trainer/compute/job_batches.h"
 #include "server/trainer/compute/task.h"
-#include "server/trainer/pipeline/successor.h"
-#include "server/trainer/pipeline/train.h"
 
 namespace trammel {
 

@@ -6,7 +6,7 @@
 
 #include "server/base/units.h"
 #include "server/measurement/checked_batch.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 
 namespace trammel::year {

@@ -1,0 +1,310 @@
+#include "server/tasks/train/train.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "server/calibrate/agreement.h"
+#include "server/calibrate/batch_check.h"
+#include "server/calibrate/calibrate_with_maps.h"
+#include "server/calibrate/frames/frames.h"
+#include "server/calibrate/identify_sessions.h"
+#include "server/calibrate/orientation_check.h"
+#include "server/compensate/budget/error_budget.h"
+#include "server/compensate/hidden_error.h"
+#include "server/compensate/world.h"
+#include "server/measurement/gauges.h"
+#include "server/measurement/repeats.h"
+#include "server/measurement/sessions.h"
+#include "server/measurement/split.h"
+#include "server/tasks/train/among_twins.h"
+#include "server/tasks/train/bias_learning.h"
+#include "server/tasks/train/extrapolation.h"
+#include "server/tasks/train/given_up.h"
+#include "server/tasks/train/left_out.h"
+#include "server/tasks/train/refitted.h"
+#include "server/tasks/train/train_sessions.h"
+
+namespace trammel {
+
+namespace {
+
+constexpr const char* kProgramVersion = "0.1.0";
+constexpr const char* kNoBias = "none";
+constexpr const char* kNoBiasOfGauges =
+    "no bias: one is learned from positions, and the batch has distances or touches";
+
+/// The rows to learn from, repeats merged, and those to validate by, as they were measured.
+BatchSplit prepared(const CheckedBatch& batch, double sigma) {
+  return {merge_repeats(batch.training(), sigma).batch, batch.held_out()};
+}
+
+/// The sources to identify, as asked.
+Result<std::vector<std::string>> sources_of(const Cell& cell, const TrainOptions& options) {
+  Result<std::vector<std::string>> names =
+      options.level ? parse_level(*options.level) : Result<std::vector<std::string>>(cell.model.error_sources);
+  if (!names) return names;
+  return with_unknown_tool(std::move(*names), cell);
+}
+
+/// What to take the arm's temperature for where a request does not say it.
+void record_temperature(CompensatedModel::Parts& parts, const MeasurementBatch& trained) {
+  std::vector<double> known;
+  for (const Measurement& m : trained.measurements) {
+    if (m.context.temperature) known.push_back(*m.context.temperature);
+  }
+  parts.temperature_mean.reset();
+  if (known.empty()) return;
+  const Eigen::Map<const Eigen::ArrayXd> t(known.data(), static_cast<Eigen::Index>(known.size()));
+  parts.temperature_mean = t.mean();
+  parts.temperature_stddev = std::sqrt((t - t.mean()).square().mean());
+}
+
+/// Where the model was trained: the joints' ranges, and what else a promise is about.
+void record_domain(CompensatedModel::Parts& parts, const MeasurementBatch& trained) {
+  parts.measured = what_was_measured(parts.physics, trained);
+  parts.q_min = parts.q_max = trained.measurements.front().context.q;
+  for (const Measurement& m : trained.measurements) {
+    parts.q_min = parts.q_min.cwiseMin(m.context.q);
+    parts.q_max = parts.q_max.cwiseMax(m.context.q);
+  }
+}
+
+/// When it was trained, and from how new measurements: those of the model that it starts from count, too.
+void record_stamp(CompensatedModel::Parts& parts, const CheckedBatch& batch, const TrainOptions& options) {
+  parts.provenance.trained_at = options.trained_at;
+  parts.provenance.measured_at = std::max(parts.provenance.measured_at, batch.rows().measured_at);
+  parts.provenance.program_version = kProgramVersion;
+}
+
+/// Where the model was trained, and from what: `trained` are the rows of `batch` that were not held out.
+void record_training(CompensatedModel::Parts& parts, const CheckedBatch& batch, const MeasurementBatch& trained,
+                     const TrainOptions& options) {
+  record_domain(parts, trained);
+  for (const Measurement& m : trained.measurements) parts.trained_with.emplace(m.context.tool, m.context.payload);
+  record_temperature(parts, trained);
+  parts.provenance.level.clear();
+  for (const ErrorSourcePtr& source : parts.physics.sources) {
+    parts.provenance.level += (parts.provenance.level.empty() ? "" : ",") + source->name();
+  }
+  parts.provenance.batch_id = batch.id();
+  parts.provenance.batch_hash = batch.hash();
+  parts.provenance.training_poses = static_cast<int>(trained.measurements.size());
+  parts.provenance.seed = options.seed;
+  record_stamp(parts, batch, options);
+}
+
+/// Adds the model's figures on the poses that it was trained on.
+Status add_training_figures(CompensatedModel::Parts& parts, const MeasurementBatch& train) {
+  const CompensatedModel bare = TRY(CompensatedModel::make(parts));
+  parts.training = bare.evaluate(train);
+  return {};
+}
+
+/// The model with its figures on the poses it was trained on and on those held out.
+Result<CompensatedModel> validated(CompensatedModel::Parts parts, const BatchSplit& split) {
+  TRY(add_training_figures(parts, split.train));
+  Result<CompensatedModel> bare = CompensatedModel::make(parts);
+  if (!bare) return bare;
+  if (const double hidden = hidden_by_sigma(*bare); hidden > parts.discrepancy) {
+    parts.discrepancy = hidden;
+    TRY(add_training_figures(parts, split.train));
+    bare = CompensatedModel::make(parts);
+    if (!bare) return bare;
+  }
+  parts.budget.reset();
+  if (has_positions(split.train)) parts.budget = error_budget(*bare, split.train);
+  parts.validation.reset();
+  if (!split.validation.measurements.empty()) parts.validation = bare->evaluate(split.validation);
+  return CompensatedModel::make(std::move(parts));
+}
+
+/// Says what is being done; false: give up.
+using Report = std::function<bool(const std::string& stage, double share)>;
+
+/// A bias learned anew for a model whose named sources were, too: its poses become the domain. Where there is none to
+/// take, the domain of the physics stays.
+Status add_bias_anew(Refitted& refitted, const std::string& kernel, const TrainOptions& options, const Report& report) {
+  CompensatedModel::Parts& parts = refitted.parts;
+  const LeftOut left_out(refitted.found, refitted.poses);
+  const JointVector slope = extrapolation_slope(left_out, parts.physics.cell->robot);
+  const JointVector slope_before = parts.extrapolation_slope;
+  parts.extrapolation_slope = slope;
+  const Status learned = add_bias(parts, refitted.poses, kernel, left_out, options.seed,
+                                  [&](double share) { return report("learning the bias", 0.3 + 0.6 * share); });
+  if (!learned) return learned;
+  if (parts.bias) {
+    record_domain(parts, refitted.poses);
+  } else if (slope_before.size() > 0) {
+    parts.extrapolation_slope = slope.cwiseMax(slope_before);
+  }
+  return {};
+}
+
+/// train() from another model.
+Result<CompensatedModel> train_from(const CompensatedModel& from, const std::shared_ptr<const Cell>& cell,
+                                    const CheckedBatch& batch, BatchSplit split, const TrainOptions& options,
+                                    const Report& report) {
+  std::vector<LeftOutSession> unplaced = leave_out_unplaced(split);
+  for (MeasurementBatch* rows : {&split.train, &split.validation}) {
+    if (!has_sessions(*rows)) continue;
+    InWorld placed = TRY(in_world_of(from, *rows));
+    *rows = std::move(placed.batch);
+  }
+  Refitted refit = TRY(refitted(from, cell, batch, split.train, options.refit));
+  if (options.bias) {
+    TRY(add_bias_anew(refit, *options.bias, options, report));
+  }
+  refit.parts.sessions_left_out = std::move(unplaced);
+  if (!report("validating", 0.9)) return given_up();
+  record_stamp(refit.parts, batch, options);
+  return validated(std::move(refit.parts), split);
+}
+
+/// Parts of a calibrated model; the slope is that of its physics.
+CompensatedModel::Parts calibrated_parts(CalibrationResult calibration, const LeftOut& left_out) {
+  CompensatedModel::Parts parts;
+  parts.extrapolation_slope = extrapolation_slope(left_out, calibration.model.cell->robot);
+  parts.physics = std::move(calibration.model);
+  parts.parameters = std::move(calibration.parameters);
+  parts.unidentifiable = std::move(calibration.unidentifiable);
+  parts.covariance = std::move(calibration.covariance);
+  parts.rank = calibration.rank;
+  parts.condition_number = calibration.condition_number;
+  parts.observability_index = calibration.observability_index;
+  parts.suspects = std::move(calibration.suspects);
+  parts.sessions = std::move(calibration.sessions);
+  parts.cost_record = std::move(calibration.cost_record);
+  parts.discrepancy = calibration.discrepancy;
+  return parts;
+}
+
+/// The physics by all rows of `batch`, and what changed between its sessions.
+Result<IdentifiedSessions> identified_on(const MeasurementBatch& batch, const std::shared_ptr<const Cell>& cell,
+                                         const std::vector<std::string>& sources, const TrainOptions& options,
+                                         const Report& report) {
+  const Identify identify = [&](const std::vector<std::string>& names) {
+    return options.fleet ? calibrate_among_twins(cell, names, batch, *options.fleet)
+                         : calibrate_with_maps(cell, names, batch, {.held = {}, .weigh_links = true});
+  };
+  return identify_sessions(identify, sources, batch, [&](double share) -> Status {
+    if (!report("asking what changed between the sessions", 0.3 * share)) return given_up();
+    return {};
+  });
+}
+
+/// The same without rows that fit none of the arms on which the others agree. They leave `batch`, and are suspects.
+Result<IdentifiedSessions> identified_by_most(Result<IdentifiedSessions> plain, MeasurementBatch& batch,
+                                              const std::shared_ptr<const Cell>& cell,
+                                              const std::vector<std::string>& sources, const TrainOptions& options,
+                                              const Report& report) {
+  const auto calibration = plain.map([](const IdentifiedSessions& all) { return all.calibration; });
+  std::optional<Agreement> agreement = agreement_of(cell, sources, batch, calibration);
+  if (!agreement) return plain;
+  Result<IdentifiedSessions> found = identified_on(agreement->agreeing, cell, sources, options, report);
+  if (!found) return plain;
+  add_suspects(agreement->others, found->calibration);
+  batch = std::move(agreement->agreeing);
+  return found;
+}
+
+/// The physics, identified anew; `split` comes into its world.
+Result<IdentifiedSessions> identified(const std::shared_ptr<const Cell>& cell, BatchSplit& split,
+                                      const TrainOptions& options, const Report& report) {
+  const std::vector<std::string> sources = TRY(sources_of(*cell, options));
+  auto found = identified_by_most(identified_on(split.train, cell, sources, options, report), split.train, cell,
+                                  sources, options, report);
+  if (!found) return found;
+  split.train = aligned(std::move(split.train), found->calibration.sessions, cell->tracker);
+  split.validation = aligned(std::move(split.validation), found->calibration.sessions, cell->tracker);
+  return found;
+}
+
+/// train() from nothing but the measurements.
+Result<CompensatedModel> train_anew(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+                                    BatchSplit split, const TrainOptions& options, const Report& report) {
+  std::vector<LeftOutSession> unplaced = leave_out_unplaced(split);
+  IdentifiedSessions found = TRY(identified(cell, split, options, report));
+  const LeftOut left_out(found.calibration, split.train);
+  CompensatedModel::Parts parts = calibrated_parts(std::move(found.calibration), left_out);
+  parts.changes = std::move(found.changes);
+  parts.sessions_as_given = !parts.sessions.empty() && !batch.rows().clock;
+  parts.sessions_left_out = std::move(unplaced);
+  const std::string asked = options.bias.value_or(cell->model.bias);
+  const bool no_choice = asked == kAutoBias && has_gauges(batch.rows());
+  TRY(add_bias(parts, split.train, no_choice ? kNoBias : asked, left_out, options.seed,
+               [&](double share) { return report("learning the bias", 0.3 + 0.6 * share); }));
+  if (no_choice) parts.bias_choice = BiasChoice{kNoBias, {}, kNoBiasOfGauges};
+  if (!report("validating", 0.9)) return given_up();
+  record_training(parts, batch, split.train, options);
+  return validated(std::move(parts), split);
+}
+
+/// Refuses what is not learned where there are gauges: a bias, since a kernel learns of errors of the position, three
+/// numbers a pose; several set-ups; what twins have in common.
+Status check_gauges(const MeasurementBatch& batch, const Cell& cell, const TrainOptions& options) {
+  if (!has_gauges(batch)) return {};
+  if (has_sessions(batch)) return require_positions(batch, "a training from several set-ups of the instrument");
+  if (options.fleet) return require_positions(batch, "a training with prior: fleet");
+  const std::string& bias = options.bias ? *options.bias : cell.model.bias;
+  if (bias == kNoBias || bias == kAutoBias) return {};
+  return refused("a bias ({}) is learned from positions, and the batch has distances or touches", bias)
+      .in("batch " + batch.id)
+      .of("distance_mm")
+      .with_text(bias)
+      .next("train with --bias none (model: {bias: none} in the cell file): the physics is identified from all rows");
+}
+
+/// Refuses a batch that was read wrongly. A model to start from may have another tool than the cell file.
+Status check_read(const MeasurementBatch& batch, const Cell& cell, const TrainOptions& options) {
+  const Cell known = options.from ? with_known_tools(cell, *options.from, options.refit) : cell;
+  if (options.looked_at) return check_orientations(batch, known);
+  if (!options.from) return check_batch(batch, known);
+  auto doubt = reading_doubt(batch, known);
+  if (!doubt) return {};
+  return Failure(std::move(*doubt)).in("batch " + batch.id);
+}
+
+}  // namespace
+
+Result<CompensatedModel> train(std::shared_ptr<const Cell> cell, const CheckedBatch& batch,
+                               const TrainOptions& options) {
+  const Report report = [&](const std::string& stage, double share) {
+    return !options.progress || options.progress(stage, share);
+  };
+  if (options.from) {
+    TRY(check_may_start_from(*options.from, *cell, batch.rows(), options.refit));
+  }
+  TRY(check_gauges(batch.rows(), *cell, options));
+  TRY(check_read(batch.rows(), *cell, options));
+  const BatchSplit split = prepared(batch, cell->tracker.sigma);
+  if (split.train.measurements.empty()) return refused("no rows to train on").in("batch " + batch.id()).beyond(0, 1);
+
+  if (!report("calibrating", 0.0)) return given_up();
+  Result<CompensatedModel> model = options.from ? train_from(*options.from, cell, batch, split, options, report)
+                                                : train_anew(cell, batch, split, options, report);
+  if (model && !report("done", 1.0)) return given_up();
+  return model;
+}
+
+Result<CompensatedModel> learn_bias(const CompensatedModel& calibrated, const CheckedBatch& batch,
+                                    const TrainOptions& options) {
+  const Cell& cell = calibrated.cell();
+  TRY(require_positions(batch.rows(), "a bias"));
+  TRY(check_orientations(batch.rows(), cell));
+  const InWorld here = TRY(in_world_of(calibrated, batch.rows()));
+  const MeasurementBatch& rows = here.batch;
+  CompensatedModel::Parts parts = calibrated.parts();
+  if (calibrated.provenance().batch_hash != batch.hash()) parts.suspects.clear();  // of other poses
+  CalibrationResult as_it_is;
+  as_it_is.model = parts.physics;
+  as_it_is.covariance = Eigen::MatrixXd::Zero(parts.covariance.rows(), parts.covariance.cols());
+  as_it_is.suspects = parts.suspects;
+  const LeftOut left_out(as_it_is, rows);
+  parts.extrapolation_slope = extrapolation_slope(left_out, cell.robot);
+  TRY(add_bias(parts, rows, options.bias.value_or(cell.model.bias), left_out, options.seed,
+               [&](double share) { return !options.progress || options.progress("learning the bias", share); }));
+  record_training(parts, batch, rows, options);
+  return validated(std::move(parts), {rows, {}});
+}
+
+}  // namespace trammel
