@@ -2,6 +2,7 @@
 
 #include <cstddef>
 
+#include "contractPubSubTypes.h"
 #include "correct_targetPubSubTypes.h"
 #include "diagnosePubSubTypes.h"
 #include "idl/limits.h"
@@ -84,6 +85,12 @@ struct ModelStatusTopic {
 struct TrainingProgressTopic {
   using Type = TrainingProgressPubSubType;
   static constexpr const char* kName = "TrainingProgress";
+  static constexpr std::size_t kMaxSample = kMaxStateSample;
+};
+/// Not of one contract: its name has no number.
+struct SpokenContractTopic {
+  using Type = SpokenContractPubSubType;
+  static constexpr const char* kName = "SpokenContract";
   static constexpr std::size_t kMaxSample = kMaxStateSample;
 };
 struct ServiceStatusTopic {

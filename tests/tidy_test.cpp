@@ -41,14 +41,15 @@ struct Outsider {
 };
 
 const std::map<std::string, Outsider> kOutsiders = {
-    {"clients/session", {{"idl"}, 0}},
-    {"clients/cam", {{"idl", "clients/session"}, 2}},
+    {"clients/session", {{"idl", "idl/transport", "idl/repairs"}, 0}},
+    {"clients/cam", {{"clients/session"}, 2}},
     {"clients/cli", {{"clients/session", "clients/cam"}, 7}},
     {"clients/library", {{"clients/session"}, 7}},
     {"clients/python", {{}, -1}},
     {"clients", {{"clients/cli"}, -1}},
-    {"idl", {{"idl/guard"}, 0}},
-    {"idl/guard", {{}, 0}},
+    {"idl", {{}, 0}},
+    {"idl/repairs", {{"idl"}, 0}},
+    {"idl/transport", {{"idl", "idl/repairs"}, 0}},
 };
 
 /// Headers of other people's libraries that only some may include.
@@ -204,7 +205,7 @@ std::optional<std::string> why_not(const Rooms& rooms, const std::string& folder
     if (target_floor && *target_floor <= outsider->second.highest_floor) return std::nullopt;
     return target + " is not for " + room;
   }
-  if (target == "idl" || target == "idl/guard") {
+  if (target == "idl" || target.starts_with("idl/")) {
     return room == "server/dds" ? std::nullopt : std::optional<std::string>(target + " is for server/dds");
   }
   if (!target_floor) return target + " has no floor that the server knows";

@@ -16,7 +16,7 @@
 #include <utility>
 
 #include "clients/session/server_watch.h"
-#include "idl/transport.h"
+#include "idl/transport/transport.h"
 #include "server/base/mutex.h"
 
 namespace trammel::client {

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "clients/session/session_types.h"
-#include "idl/valid.h"
+#include "idl/repairs/valid.h"
 #include "server/base/result.h"
 
 /// Converts between the types of the session and those of the wire.

@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "idl/places.h"
+#include "idl/transport/places.h"
 
 namespace trammel::client {
 namespace {

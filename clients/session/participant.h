@@ -17,7 +17,7 @@
 #include "clients/session/server_watch.h"
 #include "clients/session/session.h"
 #include "idl/limits.h"
-#include "idl/quiet_library.h"
+#include "idl/repairs/quiet_library.h"
 #include "server/base/mutex.h"
 
 namespace trammel::client {

@@ -203,8 +203,7 @@ void ServerWatch::on_contract(const wire::SpokenContract* spoken, const std::str
     if (spoken == nullptr) {
       others_.erase(participant);
     } else if (spoken->contract_version() != wire::CONTRACT_VERSION) {
-      others_[participant] = {spoken->server().to_string(), spoken->program_version().to_string(),
-                              spoken->contract_version()};
+      others_[participant] = {spoken->server().to_string(), spoken->program_version(), spoken->contract_version()};
       if (!others_since_) others_since_ = Clock::now();
     }
     if (others_.empty()) others_since_.reset();

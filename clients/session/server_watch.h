@@ -10,9 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "idl/contract.h"
-#include "idl/state_reader.h"
-#include "idl/transport.h"
+#include "idl/transport/state_reader.h"
+#include "idl/transport/transport.h"
 #include "server/base/mutex.h"
 
 namespace trammel::client {

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "idl/security.h"
+#include "idl/transport/security.h"
 #include "server/base/plain_text.h"
 
 namespace trammel {

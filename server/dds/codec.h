@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "idl/valid.h"
+#include "idl/repairs/valid.h"
 #include "server/registry/model_registry.h"
 #include "server/trainer/trainer.h"
 

@@ -14,9 +14,9 @@
 #include <utility>
 #include <vector>
 
-#include "idl/places.h"
-#include "idl/ros2.h"
-#include "idl/transport.h"
+#include "idl/transport/places.h"
+#include "idl/transport/ros2.h"
+#include "idl/transport/transport.h"
 #include "server/base/mutex.h"
 #include "server/dds/codec.h"
 #include "server/dds/handlers.h"

@@ -15,7 +15,8 @@
 
 namespace trammel {
 
-/// What start() would refuse in the folder of certificates and permissions (idl/security.h); nothing where it is empty.
+/// What start() would refuse in the folder of certificates and permissions (idl/transport/security.h); nothing where it
+/// is empty.
 [[nodiscard]] Status check_security(const std::string& folder);
 /// Whether requests can be recorded there; makes nothing.
 [[nodiscard]] Status check_records(const RecordOptions& options);

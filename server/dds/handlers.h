@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "idl/valid.h"
+#include "idl/repairs/valid.h"
 #include "server/base/mutex.h"
 #include "server/dds/portioned_answer.h"
 #include "server/metrics/work_counts.h"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "idl/guard/dropped.h"
+#include "idl/repairs/guard/dropped.h"
 
 namespace trammel {
 

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "idl/transport.h"
+#include "idl/transport/transport.h"
 
 namespace trammel {
 

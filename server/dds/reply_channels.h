@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "idl/transport.h"
+#include "idl/transport/transport.h"
 #include "server/base/mutex.h"
 #include "server/dds/reply_channel.h"
 #include "server/dds/reply_sink.h"

@@ -7,7 +7,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "idl/safe_type.h"
+#include "idl/repairs/safe_type.h"
 #include "server/base/mutex.h"
 
 namespace trammel {

@@ -10,7 +10,7 @@
 #include <string>
 #include <utility>
 
-#include "idl/transport.h"
+#include "idl/transport/transport.h"
 #include "server/base/mutex.h"
 #include "server/dds/call_report.h"
 #include "server/dds/codec.h"

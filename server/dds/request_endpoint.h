@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "idl/transport.h"
+#include "idl/transport/transport.h"
 #include "server/dds/reply_channels.h"
 #include "server/dds/request_call.h"
 #include "server/dds/result_words.h"

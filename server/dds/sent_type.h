@@ -1,6 +1,6 @@
 #pragma once
 
-#include "idl/transport.h"
+#include "idl/transport/transport.h"
 
 namespace trammel {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "idl/transport.h"
+#include "idl/transport/transport.h"
 #include "server/base/mutex.h"
 #include "server/dds/client_names.h"
 #include "server/dds/packet_report.h"

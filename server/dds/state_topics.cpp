@@ -1,6 +1,5 @@
 #include "server/dds/state_topics.h"
 
-#include "idl/contract.h"
 #include "server/dds/codec.h"
 
 namespace trammel {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "idl/transport.h"
+#include "idl/transport/transport.h"
 #include "server/registry/model_registry.h"
 
 namespace trammel {

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "idl/transport.h"
+#include "idl/transport/transport.h"
 
 namespace trammel {
 

@@ -17,7 +17,7 @@
 #include <thread>
 #include <utility>
 
-#include "idl/transport.h"
+#include "idl/transport/transport.h"
 
 /// Clients without a session, and a server that computes nothing: what is left is the transport.
 namespace trammel::test {

@@ -1,5 +1,5 @@
 // Who hears the HEARTBEATs of discovery that the others are spared.
-#include "idl/askers.h"
+#include "idl/repairs/askers.h"
 
 #include <gtest/gtest.h>
 

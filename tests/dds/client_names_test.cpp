@@ -5,7 +5,7 @@
 
 #include <initializer_list>
 
-#include "idl/security.h"
+#include "idl/transport/security.h"
 
 namespace trammel {
 namespace {

@@ -1,4 +1,4 @@
-#include "idl/domain_gate.h"
+#include "idl/repairs/domain_gate.h"
 
 #include <gtest/gtest.h>
 

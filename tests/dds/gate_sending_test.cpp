@@ -12,9 +12,9 @@
 #include <memory>
 #include <vector>
 
-#include "idl/domain_gate.h"
-#include "idl/guard/rtps_bytes.h"
-#include "idl/participant.h"
+#include "idl/repairs/domain_gate.h"
+#include "idl/repairs/guard/rtps_bytes.h"
+#include "idl/transport/participant.h"
 #include "tests/support/rtps_packet.h"
 
 namespace trammel::wire {

@@ -1,6 +1,6 @@
 // What each kind of packet meets at the guard. The packets that harm the library itself are in
 // tests/end_to_end/hostile_packets_test.cpp.
-#include "idl/guard/guard.h"
+#include "idl/repairs/guard/guard.h"
 
 #include <gtest/gtest.h>
 
@@ -10,9 +10,9 @@
 #include <random>
 #include <vector>
 
-#include "idl/guard/announcement_check.h"
-#include "idl/guard/cut_sample.h"
 #include "idl/limits.h"
+#include "idl/repairs/guard/announcement_check.h"
+#include "idl/repairs/guard/cut_sample.h"
 #include "tests/support/rtps_packet.h"
 
 namespace trammel::wire {

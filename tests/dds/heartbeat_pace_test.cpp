@@ -1,5 +1,5 @@
 // Of what the library repeats to everybody, only as much leaves as says something.
-#include "idl/heartbeat_pace.h"
+#include "idl/repairs/heartbeat_pace.h"
 
 #include <gtest/gtest.h>
 

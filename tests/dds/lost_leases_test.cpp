@@ -1,5 +1,5 @@
 // Of two participants neither keeps what the other one has forgotten.
-#include "idl/lost_leases.h"
+#include "idl/repairs/lost_leases.h"
 
 #include <gtest/gtest.h>
 

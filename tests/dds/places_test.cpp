@@ -1,5 +1,5 @@
 // What is believed of what discovery servers tell.
-#include "idl/places.h"
+#include "idl/transport/places.h"
 
 #include <gtest/gtest.h>
 

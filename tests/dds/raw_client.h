@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "idl/transport.h"
+#include "idl/transport/transport.h"
 
 namespace trammel::test {
 

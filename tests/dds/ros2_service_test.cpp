@@ -6,7 +6,7 @@
 #include <mutex>
 #include <set>
 
-#include "idl/ros2.h"
+#include "idl/transport/ros2.h"
 #include "server/dds/dds_service.h"
 #include "tests/dds/backend.h"
 

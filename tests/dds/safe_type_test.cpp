@@ -1,4 +1,4 @@
-#include "idl/safe_type.h"
+#include "idl/repairs/safe_type.h"
 
 #include <gtest/gtest.h>
 

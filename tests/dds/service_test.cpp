@@ -11,7 +11,6 @@
 #include <thread>
 
 #include "clients/session/session.h"
-#include "idl/contract.h"
 #include "server/dds/dds_service.h"
 #include "tests/dds/backend.h"
 #include "tests/dds/raw_client.h"

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "idl/places.h"
-#include "idl/transport.h"
+#include "idl/transport/places.h"
+#include "idl/transport/transport.h"
 #include "server/base/name_check.h"
 #include "server/dds/dds_options.h"
 

@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "idl/transport.h"
+#include "idl/transport/transport.h"
 #include "tests/support/own_ports.h"
 #include "tests/support/raw_participant.h"
 

@@ -11,7 +11,7 @@
 #include <string>
 #include <thread>
 
-#include "idl/valid.h"
+#include "idl/repairs/valid.h"
 #include "server/base/mutex.h"
 #include "server/base/result.h"
 #include "server/dds/records/record_options.h"

@@ -11,7 +11,7 @@
 #include <thread>
 #include <utility>
 
-#include "idl/ros2.h"
+#include "idl/transport/ros2.h"
 #include "server/base/mutex.h"
 #include "server/dds/ros2/translated.h"
 #include "server/dds/schedule/outbox.h"

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "idl/ros2.h"
+#include "idl/transport/ros2.h"
 #include "server/registry/model_registry.h"
 #include "server/trainer/trainer.h"
 
