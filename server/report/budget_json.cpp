@@ -1,7 +1,10 @@
 #include "server/report/budget_json.h"
 
+#include <algorithm>
+
 #include "server/base/units.h"
 #include "server/compensate/budget/budget_words.h"
+#include "server/compensate/budget/remedies.h"
 
 namespace trammel {
 
@@ -40,7 +43,10 @@ ordered_json json_of(const BudgetLine& line) {
 
 ordered_json json_of(const BudgetView& view) {
   ordered_json lines = ordered_json::array();
-  for (const BudgetLine& line : view.lines) lines.push_back(json_of(line));
+  std::vector<BudgetLine> largest_first = view.lines;
+  std::stable_sort(largest_first.begin(), largest_first.end(),
+                   [](const BudgetLine& one, const BudgetLine& other) { return one.alone_rms > other.alone_rms; });
+  for (const BudgetLine& line : largest_first) lines.push_back(json_of(line));
   return {{"nominal_rms_mm", to_mm(view.error_rms)}, {"lines", std::move(lines)}};
 }
 
@@ -50,11 +56,23 @@ ordered_json budget_json(const ErrorBudget& budget) {
   ordered_json json = json_of(budget.as_it_stands);
   json["poses"] = budget.poses;
   json["beyond_frames"] = json_of(budget.beyond_frames);
-  json["remedies"] = ordered_json::array();
-  for (const PutRight& step : budget.put_right)
-    json["remedies"].push_back({{"step", step.step}, {"name", step.name}, {"left_rms_mm", to_mm(step.left_rms)}});
   json["sentences"] = in_words(budget);
   return json;
+}
+
+ordered_json remedy_steps_json(const ErrorBudget& budget) {
+  ordered_json steps = ordered_json::array();
+  for (const PutRight& step : budget.put_right) {
+    if (step.step == "nothing") continue;
+    ordered_json values = ordered_json::array();
+    for (const RemedyValue& value : remedy_values(budget, step.step))
+      values.push_back({{"name", value.name}, {"add", value.add}, {"u95", value.u95}, {"unit", value.unit}});
+    steps.push_back({{"step", step.step},
+                     {"name", step.name},
+                     {"left_rms_mm", to_mm(step.left_rms)},
+                     {"values", std::move(values)}});
+  }
+  return steps;
 }
 
 }  // namespace trammel

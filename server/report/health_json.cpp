@@ -40,6 +40,65 @@ ordered_json change_json(const SeenChange& change, const CheckedSince& since) {
   return json;
 }
 
+ordered_json change_line(const std::string& line, const std::string& kind, const std::string& name) {
+  return {{"line", line},
+          {"kind", kind},
+          {"name", name},
+          {"joint", nullptr},
+          {"value", nullptr},
+          {"u95", nullptr},
+          {"unit", nullptr},
+          {"alone_rms_mm", nullptr},
+          {"with", ordered_json::array()},
+          {"action", ""}};
+}
+
+/// A line for each zero; what each of several does alone is not known.
+void add_zero_lines(const SeenChange& change, ordered_json& lines) {
+  for (const LostZero& zero : change.zeros) {
+    const std::string n = std::to_string(zero.joint + 1);
+    ordered_json line = change_line("zero:" + n, "joint_zero", "the zero of joint " + n);
+    line["joint"] = zero.joint + 1;
+    line["value"] = to_deg(zero.by);
+    line["u95"] = to_deg(zero.u95);
+    line["unit"] = "deg";
+    if (change.zeros.size() == 1) line["alone_rms_mm"] = to_mm(change.effect_rms);
+    for (const LostZero& other : change.zeros)
+      if (other.joint != zero.joint) line["with"].push_back("zero:" + std::to_string(other.joint + 1));
+    line["action"] = "re-master joint " + n;
+    lines.push_back(std::move(line));
+  }
+}
+
+ordered_json change_line(const SeenChange& change) {
+  const int joint = change.cause.joint;
+  const std::string cause(change.cause.record->spelling);
+  ordered_json line =
+      change_line(joint >= 0 ? cause + ":" + std::to_string(joint + 1) : cause, cause, in_words(change.cause));
+  if (joint >= 0) line["joint"] = joint + 1;
+  line["alone_rms_mm"] = to_mm(change.effect_rms);
+  for (const SingleCause& other : change.could_also_be) line["with"].push_back(in_words(other));
+  line["action"] = change.cause.record->action;
+  return line;
+}
+
+/// What changed since the model was made, in the shape of a budget: from what is off now to what a healthy robot
+/// leaves.
+ordered_json change_budget_json(const HealthCheck& check) {
+  ordered_json lines = ordered_json::array();
+  for (const SeenChange& change : check.changed) {
+    if (change.zeros.empty()) {
+      lines.push_back(change_line(change));
+    } else {
+      add_zero_lines(change, lines);
+    }
+  }
+  ordered_json rest = change_line("rest", "rest", "what a healthy robot leaves");
+  rest["alone_rms_mm"] = to_mm(check.expected_rms);
+  lines.push_back(std::move(rest));
+  return {{"nominal_rms_mm", to_mm(check.rms)}, {"poses", check.poses}, {"lines", std::move(lines)}};
+}
+
 constexpr double kMonth = 30 * 86400.0;  // s
 
 ordered_json drift_json(const DriftSeen& drift) {
@@ -95,6 +154,7 @@ ordered_json health_json(const HealthCheck& check, const CheckedSince& since) {
   json["drift_rate"] = check.drift_rate ? rate_json(*check.drift_rate) : ordered_json(nullptr);
   json["drift_seen"] = check.drift ? drift_json(*check.drift) : ordered_json(nullptr);
   for (const SeenChange& change : check.changed) json["changed"].push_back(change_json(change, since));
+  json["budget"] = change_budget_json(check);
   for (const SmallestEffect& smallest : check.smallest) {
     ordered_json one = cause_json(smallest.cause);
     one["effect_rms_mm"] = length_json(smallest.rms);

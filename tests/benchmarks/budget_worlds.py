@@ -12,6 +12,7 @@ import argparse
 import json
 import math
 import pathlib
+import re
 import subprocess
 import tempfile
 
@@ -126,8 +127,13 @@ def batch_file(path, arm, errors, poses, rng):
     path.write_text("\n".join(lines) + "\n")
 
 
+def line_of(key):
+    """The line of the budget that a hidden error belongs to: the lengths of a link are one, and so are its angles."""
+    return re.sub(r"^(length|twist):[a-z]+", r"\1:", key)
+
+
 def alone_mm(arm, errors, key, poses):
-    without = {k: v for k, v in errors.items() if k != key}
+    without = {k: v for k, v in errors.items() if line_of(k) != line_of(key)}
     return math.sqrt(np.mean([np.sum((arm.tip(q, errors) - arm.tip(q, without)) ** 2) for q in poses]))
 
 
@@ -170,13 +176,14 @@ def main():
             budget, poses = budget_of(trammel, folder, arm, errors, count, rng)
             sizes = {key: alone_mm(arm, errors, key, poses) for key in gross}
             largest = max(sizes, key=sizes.get)
-            line = budget["lines"][0]
-            good = line["line"] in gross and sizes[line["line"]] >= 0.8 * sizes[largest]
+            line = next((one for one in budget["lines"] if one["action"]), budget["lines"][0])
+            by_line = {line_of(key): key for key in gross}
+            good = line["line"] in by_line and sizes[by_line[line["line"]]] >= 0.8 * sizes[largest]
             right += good
             for found in budget["lines"]:
-                if found["line"] not in gross:
+                if found["line"] not in by_line:
                     continue
-                key = found["line"]
+                key = by_line[found["line"]]
                 near += abs(found["alone_rms_mm"] - sizes[key]) <= 0.05 * sizes[key]
                 lines += 1
                 if found["with"]:  # the value is of all of them together

@@ -166,11 +166,11 @@ TEST(ErrorBudget, CountsWhatThePosesCannotTellApartOnceAndNamesBoth) {
   const auto names = [](const BudgetLine& line, const char* other) {
     return std::find(line.with.begin(), line.with.end(), other) != line.with.end();
   };
-  EXPECT_TRUE(names(*tool, "length:d6"));
+  EXPECT_TRUE(names(*tool, "length:6"));
   EXPECT_TRUE(names(*base, "zero:1"));
-  EXPECT_TRUE(names(*base, "length:d1"));
+  EXPECT_TRUE(names(*base, "length:1"));
   EXPECT_NEAR(tool->value->value, 5, 0.1);
-  EXPECT_EQ(budget.line("length:d6"), nullptr);
+  EXPECT_EQ(budget.line("length:6"), nullptr);
   for (const BudgetLine& line : budget.as_it_stands.lines) {
     const bool is_tool = line.line == "tool";
     EXPECT_TRUE(is_tool || line.alone_rms < 0.3e-3) << line.line;

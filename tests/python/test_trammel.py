@@ -123,6 +123,7 @@ class Offline(unittest.TestCase):
         printed = json.loads(command_line("evaluate", "--model", self.model_path, "--batch", self.batch_path, "--json", "-"))
         printed.pop("structure", None)
         self.assertIn("coverage_95_stated", printed)
+        self.assertAlmostEqual(sum(line["share"] for line in printed.pop("budget")["lines"]), 1, places=9)
         self.assertEqual(printed.pop("notes"), self.model.notes)
         self.assertEqual(printed.pop("measured"), json.loads(json.dumps(self.model.measured)))
         here = self.model.evaluate(trammel.Batch.load(self.batch_path))
@@ -131,8 +132,10 @@ class Offline(unittest.TestCase):
     def test_tells_where_the_millimetres_come_from(self):
         budget = self.model.budget()
         self.assertAlmostEqual(sum(line["share"] for line in budget["lines"]), 1, places=9)
-        self.assertEqual(budget["remedies"][0]["step"], "nothing")
+        alone = [line["alone_rms_mm"] for line in budget["lines"]]
+        self.assertEqual(alone, sorted(alone, reverse=True))
         printed = json.loads(command_line("remedies", "--model", self.model_path, "--json", "-"))
+        self.assertEqual([step["step"] for step in printed["steps"]], ["frames", "zeros", "lengths", "loads", "trammel"])
         self.assertEqual(printed["budget"], budget)
 
     def test_diagnoses_what_the_command_line_diagnoses(self):

@@ -14,6 +14,7 @@
 #include "server/base/units.h"
 #include "server/bias/kernels/kernel_spelling.h"
 #include "server/calibrate/jump.h"
+#include "server/compensate/budget/error_budget.h"
 #include "server/compensate/known_rows.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
@@ -22,6 +23,7 @@
 #include "server/error_sources/cause_words.h"
 #include "server/health/health_check.h"
 #include "server/measurement/gauges.h"
+#include "server/report/budget_json.h"
 #include "server/report/measured_json.h"
 #include "server/report/model_page.h"
 #include "server/report/note_json.h"
@@ -266,6 +268,8 @@ Status evaluate(const EvaluateArguments& arguments) {
   warn_of_foreign_poses(model, world.batch);
   nlohmann::ordered_json json = evaluation_json(evaluation);
   json["measured"] = measured_json(model);
+  json["budget"] =
+      positions.measurements.empty() ? nlohmann::ordered_json(nullptr) : budget_json(error_budget(model, positions));
   json["notes"] = notes_json(notes);
   if (!structure.empty()) json["structure"] = structure;
   if (learned > 0) json["trained_on"] = learned;

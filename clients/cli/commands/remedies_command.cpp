@@ -49,6 +49,7 @@ nlohmann::ordered_json remedies_json(const CompensatedModel& model, const ErrorB
           {"zeros", std::move(zeros)},
           {"controller",
            {{"maker", words.maker}, {"zeros", words.zeros}, {"lengths", words.lengths}, {"load", words.load}}},
+          {"steps", remedy_steps_json(budget)},
           {"budget", budget_json(budget)}};
 }
 

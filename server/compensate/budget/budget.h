@@ -39,12 +39,12 @@ struct BudgetNumber {
 
 /// One thing that a person can point at.
 struct BudgetLine {
-  std::string line;  ///< `zero:4`, `length:a2`, `twist:alpha3`, `base`, `tool`, `compliance:2`, else as in a cell file
+  std::string line;  ///< `zero:4`, `length:2`, `twist:3`, `base`, `tool`, `compliance:2`, else as in a cell file
   LineKind kind = LineKind::kCause;
   std::string cause;                  ///< of a kCause, its spelling: `gear_transmission`
   int joint = -1;                     ///< 0-based; -1: of no single joint
   std::string name;                   ///< for people: `the zero of joint 4`
-  std::optional<BudgetNumber> value;  ///< the one number of the line; a distance for a place
+  std::optional<BudgetNumber> value;  ///< the one number of the line, the largest of a link; a distance for a place
   std::vector<BudgetNumber> numbers;  ///< of a line with several, each of them
   double alone_rms = 0;               ///< m, of the poses: what the line does to them
   double alone_max = 0;               ///< m
@@ -64,7 +64,7 @@ struct BudgetView {
 
 /// What is left when this and all before it is put right, with base and tool frames touched again each time.
 struct PutRight {
-  std::string step;     ///< `nothing`, `frames`, `zeros`, `lengths`, `load`, `correction`
+  std::string step;     ///< `nothing`, `frames`, `zeros`, `lengths`, `loads`, `trammel`
   std::string name;     ///< for people
   double left_rms = 0;  ///< m
 };

@@ -51,6 +51,11 @@ void add_values(const Datum& datum, const std::vector<Parameter>& parameters, Bu
   if (line.numbers.size() == 1) {
     line.value = line.numbers.front();
     line.numbers.clear();
+  } else if (line.kind == LineKind::kLength || line.kind == LineKind::kTwist) {
+    line.value = *std::max_element(
+        line.numbers.begin(), line.numbers.end(),
+        [](const BudgetNumber& one, const BudgetNumber& other) { return std::abs(one.value) < std::abs(other.value); });
+    line.name = name_of_link_parameter(line.value->name, datum.model.cell->robot);
   } else if (line.kind == LineKind::kBase || line.kind == LineKind::kTool) {
     const Eigen::Vector3d shift = datum.model.values.segment<3>(item.places.front());
     const Matrix3 covariance = datum.covariance.block<3, 3>(item.places.front(), item.places.front());
@@ -78,28 +83,35 @@ std::ptrdiff_t item_with(const std::vector<BudgetItem>& items, Eigen::Index plac
   return found == items.end() ? -1 : found - items.begin();
 }
 
-/// Leaves out lines of single parameters that count as being on their drawing, and names them where they are counted:
-/// beside their partners, or, where they have many or none, in one line of what is not told.
-void fold(const Datum& datum, std::vector<BudgetItem>& items, BudgetLine& untold) {
+/// Names a line that counts as being on its drawing where it is counted: beside its partners, or, where they have many
+/// or none, in one line of what is not told.
+void name_partners(const std::string& name, const std::set<std::ptrdiff_t>& partners, std::vector<BudgetItem>& items,
+                   BudgetLine& untold) {
   constexpr std::size_t kMostPartners = 2;
-  std::set<std::ptrdiff_t> folded;
+  const auto add = [&](std::vector<std::string>& names) {
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  };
+  if (partners.empty() || partners.size() > kMostPartners) return add(untold.with);
+  for (const std::ptrdiff_t partner : partners) add(items[static_cast<std::size_t>(partner)].line.with);
+}
+
+/// Leaves out parameters that count as being on their drawing, and lines that have no other.
+void fold(const Datum& datum, std::vector<BudgetItem>& items, BudgetLine& untold) {
   for (const Datum::OnDrawing& one : datum.on_drawing) {
     const std::ptrdiff_t own = item_with(items, one.parameter);
-    if (own < 0 || items[static_cast<std::size_t>(own)].places.size() > 1) continue;
-    folded.insert(own);
+    if (own < 0) continue;
+    BudgetItem& item = items[static_cast<std::size_t>(own)];
+    const bool of_links = item.line.kind == LineKind::kLength || item.line.kind == LineKind::kTwist;
+    if (item.places.size() > 1 && !of_links) continue;
     std::set<std::ptrdiff_t> partners;
     for (const Eigen::Index place : one.with) {
       const std::ptrdiff_t partner = item_with(items, place);
       if (partner >= 0 && partner != own) partners.insert(partner);
     }
-    const std::string& name = items[static_cast<std::size_t>(own)].line.line;
-    if (partners.empty() || partners.size() > kMostPartners) {
-      untold.with.push_back(name);
-    } else {
-      for (const std::ptrdiff_t partner : partners) items[static_cast<std::size_t>(partner)].line.with.push_back(name);
-    }
+    name_partners(item.line.line, partners, items, untold);
+    std::erase(item.places, one.parameter);
   }
-  for (auto it = folded.rbegin(); it != folded.rend(); ++it) items.erase(items.begin() + *it);
+  std::erase_if(items, [](const BudgetItem& item) { return item.places.empty() && !item.whole_source; });
 }
 
 BudgetLine named(LineKind kind, std::string name) {
@@ -205,19 +217,6 @@ LeftAt left_by(const CompensatedModel& model, const MeasurementBatch& positions)
   return {R_WB * errors.nominal, R_WB * errors.calibrated, R_WB * errors.compensated};
 }
 
-bool is_of_payload(const BudgetLine& line) {
-  const CauseRecord* cause = find_cause(line.cause);
-  return cause != nullptr && cause->part == causes::Part::kPayload;
-}
-
-/// What a shop puts right in this step, beside its frames.
-bool is_of_step(const BudgetLine& line, std::string_view step) {
-  if (step == "zeros") return line.kind == LineKind::kJointZero;
-  if (step == "lengths") return line.kind == LineKind::kLength || line.kind == LineKind::kTwist;
-  if (step == "load") return line.kind == LineKind::kJointCompliance || is_of_payload(line);
-  return false;
-}
-
 std::vector<PutRight> put_right(const PhysicalModel& model, const std::vector<BudgetItem>& items,
                                 const Effects& effects, const MeasurementBatch& positions,
                                 const BeyondFrames& beyond_frames) {
@@ -228,12 +227,12 @@ std::vector<PutRight> put_right(const PhysicalModel& model, const std::vector<Bu
   for (const auto& [step, name] :
        {std::pair("zeros", "zeros of the joints set in the controller"),
         std::pair("lengths", "lengths and angles of the links, where a controller takes them"),
-        std::pair("load", "load data, where a controller takes the gearboxes into account")}) {
+        std::pair("loads", "load data, where a controller takes the gearboxes into account")}) {
     for (const BudgetItem& item : items)
       if (is_of_step(item.line, step)) right.push_back(&item);
     steps.push_back({step, name, rms(beyond_frames(effects.total - effect_of_all(model, right, positions)))});
   }
-  steps.push_back({"correction", "targets corrected by this model", rms(effects.rest)});
+  steps.push_back({"trammel", "targets corrected by this model", rms(effects.rest)});
   return steps;
 }
 

@@ -22,27 +22,18 @@ Symbol symbol_of(const std::string& parameter) {
   return {parameter.substr(0, digit), std::stoi(parameter.substr(digit)) - 1};
 }
 
-/// The line of one parameter of the links.
+/// What a parameter of the links is part of: the zero of its joint, or the lengths or the angles of its link.
 BudgetLine line_of_link(const std::string& parameter, const Chain& robot) {
   const auto [letters, joint] = symbol_of(parameter);
   const bool slides = robot.joint(joint).type == JointType::kPrismatic;
-  const int n = joint + 1;
   BudgetLine line;
   line.joint = joint;
-  if (letters == "q" || (letters == "d" && slides)) {
-    line.line = fmt::format("zero:{}", n);
-    line.kind = LineKind::kJointZero;
-    line.name = fmt::format("the zero of joint {}", n);
-  } else if (letters == "d" || letters == "a") {
-    line.line = "length:" + parameter;
-    line.kind = LineKind::kLength;
-    line.name = fmt::format("the {} of link {} ({})", letters == "a" ? "length" : "offset", n, parameter);
-  } else {
-    line.line = "twist:" + parameter;
-    line.kind = LineKind::kTwist;
-    line.name = n < robot.size() ? fmt::format("the angle between axes {} and {} ({})", n, n + 1, parameter)
-                                 : fmt::format("the angle of the flange to axis {} ({})", n, parameter);
-  }
+  line.kind = letters == "q" || (letters == "d" && slides) ? LineKind::kJointZero
+              : letters == "d" || letters == "a"           ? LineKind::kLength
+                                                           : LineKind::kTwist;
+  const char* word = line.kind == LineKind::kJointZero ? "zero" : line.kind == LineKind::kLength ? "length" : "twist";
+  line.line = fmt::format("{}:{}", word, joint + 1);
+  line.name = name_of_link_parameter(parameter, robot);
   return line;
 }
 
@@ -53,10 +44,19 @@ std::string tool_of(const std::string& parameter) {
 }
 
 void add_links(const PhysicalModel& model, std::size_t source, Eigen::Index first, std::vector<BudgetItem>& items) {
-  const std::vector<Parameter>& parameters = model.sources[source]->parameters();
+  const std::size_t before = items.size();
   Eigen::Index place = first;
-  for (const Parameter& parameter : parameters)
-    items.push_back({line_of_link(parameter.name, model.cell->robot), source, {place++}, false});
+  for (const Parameter& parameter : model.sources[source]->parameters()) {
+    BudgetLine line = line_of_link(parameter.name, model.cell->robot);
+    const auto same = std::find_if(items.begin() + static_cast<std::ptrdiff_t>(before), items.end(),
+                                   [&](const BudgetItem& item) { return item.line.line == line.line; });
+    if (same == items.end()) {
+      items.push_back({std::move(line), source, {place}, false});
+    } else {
+      same->places.push_back(place);
+    }
+    ++place;
+  }
 }
 
 void add_tools(const PhysicalModel& model, std::size_t source, Eigen::Index first, std::vector<BudgetItem>& items) {
@@ -137,6 +137,17 @@ PhysicalModel without_sources(const PhysicalModel& model, const Goes& goes) {
 }
 
 }  // namespace
+
+std::string name_of_link_parameter(const std::string& parameter, const Chain& robot) {
+  const auto [letters, joint] = symbol_of(parameter);
+  const int n = joint + 1;
+  if (letters == "q" || (letters == "d" && robot.joint(joint).type == JointType::kPrismatic))
+    return fmt::format("the zero of joint {}", n);
+  if (letters == "a") return fmt::format("the length of link {} ({})", n, parameter);
+  if (letters == "d") return fmt::format("the offset of link {} ({})", n, parameter);
+  return n < robot.size() ? fmt::format("the angle between axes {} and {} ({})", n, n + 1, parameter)
+                          : fmt::format("the angle of the flange to axis {} ({})", n, parameter);
+}
 
 std::vector<BudgetItem> items_of(const PhysicalModel& model) {
   std::vector<BudgetItem> items;

@@ -16,7 +16,11 @@ struct BudgetItem {
   bool whole_source = false;         ///< all that its source does: without it the source is not there
 };
 
-/// The lines of a model. Sources that move no tool (anchors, zeros of instruments) have none; the links' own weights
+/// For people: `the length of link 3 (a3)`.
+[[nodiscard]] std::string name_of_link_parameter(const std::string& parameter, const Chain& robot);
+
+/// The lines of a model. The lengths of a link (a, d) are one line, and so are its angles (alpha, beta). Sources that
+/// move no tool (anchors, zeros of instruments) have none; the links' own weights
 /// (`self_weight`) act through the gearboxes and stand in their lines.
 [[nodiscard]] std::vector<BudgetItem> items_of(const PhysicalModel& model);
 

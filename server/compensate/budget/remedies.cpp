@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 
 #include "server/base/letters.h"
 #include "server/base/shown_value.h"
 #include "server/base/units.h"
+#include "server/error_sources/catalogue.h"
 
 namespace trammel {
 
@@ -62,6 +62,31 @@ std::vector<ZeroRemedy> zero_remedies(const ErrorBudget& budget) {
   std::sort(zeros.begin(), zeros.end(),
             [](const ZeroRemedy& one, const ZeroRemedy& other) { return one.joint < other.joint; });
   return zeros;
+}
+
+bool is_of_step(const BudgetLine& line, std::string_view step) {
+  if (step == "frames") return line.kind == LineKind::kBase || line.kind == LineKind::kTool;
+  if (step == "zeros") return line.kind == LineKind::kJointZero;
+  if (step == "lengths") return line.kind == LineKind::kLength || line.kind == LineKind::kTwist;
+  if (step != "loads") return false;
+  const CauseRecord* cause = find_cause(line.cause);
+  return line.kind == LineKind::kJointCompliance || (cause != nullptr && cause->part == causes::Part::kPayload);
+}
+
+std::vector<RemedyValue> remedy_values(const ErrorBudget& budget, std::string_view step) {
+  std::vector<RemedyValue> values;
+  for (const BudgetLine& line : budget.as_it_stands.lines) {
+    if (!is_of_step(line, step)) continue;
+    std::vector<BudgetNumber> numbers = line.numbers;
+    if (numbers.empty() && line.value) numbers = {*line.value};
+    for (const BudgetNumber& number : numbers) {
+      if (std::abs(number.value) <= number.u95) continue;
+      const bool zero = line.kind == LineKind::kJointZero;
+      values.push_back(
+          {zero ? fmt::format("joint {}", line.joint + 1) : number.name, number.value, number.u95, number.unit});
+    }
+  }
+  return values;
 }
 
 MakersWords makers_words(const Chain& robot) {

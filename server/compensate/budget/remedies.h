@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "server/compensate/budget/budget.h"
@@ -16,6 +17,18 @@ struct ZeroRemedy {
 };
 /// Of every joint whose zero is off by more than its U.
 [[nodiscard]] std::vector<ZeroRemedy> zero_remedies(const ErrorBudget& budget);
+
+/// Whether a line is put right in a step of ErrorBudget::put_right: `frames`, `zeros`, `lengths`, `loads`.
+[[nodiscard]] bool is_of_step(const BudgetLine& line, std::string_view step);
+
+/// A number that is set in a step, and what is added to what is stated now.
+struct RemedyValue {
+  std::string name;  ///< `joint 4`; else as the model has it
+  double add = 0, u95 = 0;
+  std::string unit;
+};
+/// Those of a step that are off by more than their U.
+[[nodiscard]] std::vector<RemedyValue> remedy_values(const ErrorBudget& budget, std::string_view step);
 
 /// Where a maker's controller keeps zeros, lengths and load data, in the maker's own words. By the name of the robot
 /// file; general words where no maker is known.
