@@ -7,7 +7,7 @@ namespace trammel {
 
 /// What a page is about; it stands in its head, so that other pages find it.
 struct PageMark {
-  std::string_view kind;   ///< model, diagnosis, program, health, remedies, history or fleet
+  std::string_view kind;   ///< model, diagnosis, program, health, remedies, comparison, history or fleet
   std::string cell;        ///< empty: of several
   std::string model = {};  ///< id; empty: of none
 };

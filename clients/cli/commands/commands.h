@@ -55,6 +55,7 @@ void add_doctor_command(CLI::App& app, Action& chosen);
 void add_help_commands(CLI::App& app, Action& chosen);
 void add_check_command(CLI::App& app, Action& chosen);
 void add_remedies_command(CLI::App& app, Action& chosen);
+void add_compare_command(CLI::App& app, Action& chosen);
 void add_fleet_command(CLI::App& app, Action& chosen);
 void add_diagnose_command(CLI::App& app, Action& chosen);
 void add_study_command(CLI::App& app, Action& chosen);

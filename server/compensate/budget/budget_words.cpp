@@ -41,6 +41,16 @@ std::string sentence(const BudgetLine& line) {
   return text;
 }
 
+std::vector<std::string> difference_in_words(const ModelDifference& difference, int most) {
+  std::vector<std::string> text;
+  for (BudgetLine line : difference.budget.beyond_frames.lines) {
+    if (line.alone_rms <= 0 || most-- <= 0) continue;
+    line.action.clear();  // of a difference nothing can be told to be far beyond what is usual
+    text.push_back(sentence(line));
+  }
+  return text;
+}
+
 std::vector<std::string> in_words(const ErrorBudget& budget, int most) {
   if (budget.as_it_stands.lines.empty()) return {};
   std::vector<std::string> text = {fmt::format(

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "server/compensate/budget/between.h"
 #include "server/compensate/budget/budget.h"
 
 namespace trammel {
@@ -13,5 +14,8 @@ namespace trammel {
 
 /// The budget in its `most` first lines, beneath a heading that names the whole error. Empty without lines.
 [[nodiscard]] std::vector<std::string> in_words(const ErrorBudget& budget, int most = 6);
+
+/// What is between two models in its `most` first lines, beyond what touching frames would take away.
+[[nodiscard]] std::vector<std::string> difference_in_words(const ModelDifference& difference, int most = 6);
 
 }  // namespace trammel

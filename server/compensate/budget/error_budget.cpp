@@ -282,6 +282,20 @@ ErrorBudget error_budget(const CompensatedModel& model, const std::vector<PoseCo
   return error_budget(model, as_predicted);
 }
 
+ErrorBudget error_budget(const CalibrationResult& between, const PredictedDifference& predicted) {
+  MeasurementBatch at;
+  for (const PoseContext& pose : predicted.poses) {
+    Measurement m;
+    m.context = pose;
+    m.context.served = true;
+    m.sigma = 0;
+    at.measurements.push_back(std::move(m));
+  }
+  const auto n = std::ssize(predicted.poses);
+  const LeftAt left{predicted.all, predicted.learned, Eigen::Matrix3Xd::Zero(3, n)};
+  return budget_of({between.model, between.parameters, between.covariance}, left, at, !predicted.learned.isZero(0));
+}
+
 ErrorBudget error_budget(const CalibrationResult& calibration, const MeasurementBatch& measured) {
   const MeasurementBatch positions = positions_of(measured);
   if (positions.measurements.empty()) return {};

@@ -13,4 +13,12 @@ namespace trammel {
 /// The same of a calibration, at the poses that it was made from: nothing is learned beside it.
 [[nodiscard]] ErrorBudget error_budget(const CalibrationResult& calibration, const MeasurementBatch& measured);
 
+/// What two models predict differently, 3 x N, m, in W; `learned` of it is by what they learned beyond the physics.
+struct PredictedDifference {
+  std::vector<PoseContext> poses;
+  Eigen::Matrix3Xd all, learned;
+};
+/// Of the difference between two models, whose parameters differ by those of `between`.
+[[nodiscard]] ErrorBudget error_budget(const CalibrationResult& between, const PredictedDifference& predicted);
+
 }  // namespace trammel

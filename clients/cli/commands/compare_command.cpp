@@ -1,0 +1,214 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+
+#include "clients/cli/commands/commands.h"
+#include "clients/cli/files/batch_files.h"
+#include "clients/cli/terminal/options.h"
+#include "clients/cli/terminal/output.h"
+#include "clients/cli/text/evaluation_text.h"
+#include "clients/cli/text/notes_text.h"
+#include "server/base/shown_value.h"
+#include "server/base/units.h"
+#include "server/compensate/budget/between.h"
+#include "server/compensate/budget/budget_words.h"
+#include "server/compensate/model_file.h"
+#include "server/compensate/model_notes.h"
+#include "server/compensate/paired_gain.h"
+#include "server/compensate/world.h"
+#include "server/measurement/gauges.h"
+#include "server/plan/plan.h"
+#include "server/report/budget_json.h"
+#include "server/report/comparison_page.h"
+#include "server/report/note_json.h"
+#include "server/report/pages_beside.h"
+#include "server/tasks/accept/fits_cell.h"
+
+namespace trammel::cli {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr int kDrawnPoses = 200;
+constexpr std::size_t kShownPoses = 5;
+
+struct CompareArguments {
+  std::string before, now, batch, json, report;
+};
+
+/// Both models on the same measurements.
+struct Judged {
+  Evaluation before, now;
+  PairedGain gain;
+};
+
+struct Compared {
+  std::vector<PoseContext> poses;
+  std::string where;  ///< which poses, for people
+  ModelDifference difference;
+  std::optional<Judged> judged;
+};
+
+/// Poses of the cell that both models know: a Latin hypercube, with a tool and a payload of the newer model.
+Result<std::vector<PoseContext>> drawn_poses(const CompensatedModel& model) {
+  PlanOptions options;
+  options.count = kDrawnPoses;
+  const Eigen::MatrixXd q = TRY(plan_poses(model.cell(), options));
+  std::vector<PoseContext> poses(static_cast<std::size_t>(q.rows()));
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    poses[i].q = q.row(static_cast<Eigen::Index>(i)).transpose();
+    if (!model.parts().trained_with.empty())
+      std::tie(poses[i].tool, poses[i].payload) = *model.parts().trained_with.begin();
+  }
+  return poses;
+}
+
+Result<Judged> judge(const CompensatedModel& before, const CompensatedModel& now, const MeasurementBatch& batch) {
+  const InWorld by_old = TRY(in_world_of(before, batch));
+  const InWorld by_new = TRY(in_world_of(now, batch));
+  return Judged{before.evaluate(by_old.batch), now.evaluate(by_new.batch),
+                paired_gain(before.errors_B(positions_of(by_old.batch)).compensated,
+                            now.errors_B(positions_of(by_new.batch)).compensated)};
+}
+
+Result<Compared> compared(const CompensatedModel& before, const CompensatedModel& now, const CompareArguments& asked) {
+  TRY(check_fits_cell(before, now.cell(), "model " + before.provenance().id));
+  Compared all;
+  if (asked.batch.empty()) {
+    all.poses = TRY(drawn_poses(now));
+    all.where = fmt::format("{} poses drawn over the cell", all.poses.size());
+  } else {
+    const CheckedBatch batch = TRY(read_checked_batches({asked.batch}, now.cell()));
+    TRY(require_positions(batch.rows(), "compare --batch"));
+    for (const Measurement& m : positions_of(batch.rows()).measurements) all.poses.push_back(m.context);
+    all.where = fmt::format("{} poses of {}", all.poses.size(), batch.id());
+    all.judged = TRY(judge(before, now, batch.rows()));
+  }
+  for (const PoseContext& pose : all.poses) {
+    TRY(before.check_trained_with(pose.tool, pose.payload));
+    TRY(now.check_trained_with(pose.tool, pose.payload));
+  }
+  all.difference = difference_between(before, now, all.poses);
+  return all;
+}
+
+double rms_of(const ModelDifference& difference) {
+  double sum = 0;
+  for (const Vector3& moved : difference.moved_B) sum += moved.squaredNorm();
+  return std::sqrt(sum / static_cast<double>(difference.moved_B.size()));
+}
+
+/// Indices of the poses, those that moved most first.
+std::vector<std::size_t> most_moved(const ModelDifference& difference) {
+  std::vector<std::size_t> order(difference.moved_B.size());
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return difference.moved_B[a].squaredNorm() > difference.moved_B[b].squaredNorm();
+  });
+  order.resize(std::min(order.size(), kShownPoses));
+  return order;
+}
+
+std::string text_of(const Compared& all, const CompensatedModel& before, const CompensatedModel& now) {
+  const ModelDifference& found = all.difference;
+  std::string text = fmt::format(
+      "model {} predicts otherwise than model {} by {:.4f} mm rms, {:.4f} mm at most, at {};\n"
+      "touching base and tool frames would leave {:.4f} mm of it\n",
+      now.provenance().id, before.provenance().id, to_mm(rms_of(found)),
+      to_mm(found.moved_B[most_moved(found).front()].norm()), all.where, to_mm(found.budget.beyond_frames.error_rms));
+  for (const std::string& line : difference_in_words(found)) text += line + "\n";
+  if (all.judged)
+    text += fmt::format("on these poses: {}\nmodel {}:\n{}model {}:\n{}", to_string(all.judged->gain),
+                        before.provenance().id, evaluation_table(all.judged->before), now.provenance().id,
+                        evaluation_table(all.judged->now));
+  return text;
+}
+
+ordered_json model_of(const CompensatedModel& model) {
+  const ModelProvenance& from = model.provenance();
+  return {{"id", from.id},
+          {"cell", model.cell().name},
+          {"level", from.level},
+          {"batch", from.batch_id},
+          {"trained_at_unix_s", from.trained_at},
+          {"notes", notes_json(notes_of(model))}};
+}
+
+ordered_json poses_json(const Compared& all) {
+  ordered_json poses = ordered_json::array();
+  for (const std::size_t i : most_moved(all.difference)) {
+    std::vector<double> joints;
+    for (const double q : all.poses[i].q) joints.push_back(q);
+    const Vector3 moved = 1e3 * all.difference.moved_B[i];
+    poses.push_back({{"pose", i + 1}, {"joints_si", joints}, {"moved_mm", {moved.x(), moved.y(), moved.z()}}});
+  }
+  return poses;
+}
+
+ordered_json comparison_json(const Compared& all, const CompensatedModel& before, const CompensatedModel& now) {
+  const ModelDifference& found = all.difference;
+  ordered_json parameters = ordered_json::array();
+  for (const ParameterDifference& one : found.parameters)
+    parameters.push_back({{"name", one.name},
+                          {"unit", one.unit},
+                          {"a", one.before},
+                          {"b", one.now},
+                          {"difference", one.difference()},
+                          {"u95", one.u95},
+                          {"beyond_u95", std::abs(one.difference()) > one.u95}});
+  ordered_json budget = budget_json(found.budget);
+  budget["sentences"] = difference_in_words(found);
+  ordered_json json = {{"a", model_of(before)},
+                       {"b", model_of(now)},
+                       {"poses", all.poses.size()},
+                       {"rms_mm", to_mm(rms_of(found))},
+                       {"max_mm", to_mm(found.moved_B[most_moved(found).front()].norm())},
+                       {"parameters", std::move(parameters)},
+                       {"budget", std::move(budget)},
+                       {"most_moved", poses_json(all)},
+                       {"notes", notes_json(notes_of(now))}};
+  if (all.judged)
+    json["batch"] = {{"a", evaluation_json(all.judged->before)},
+                     {"b", evaluation_json(all.judged->now)},
+                     {"gain_z", all.judged->gain.z()},
+                     {"b_is_better", all.judged->gain.beyond_chance()}};
+  return json;
+}
+
+Status compare(const CompareArguments& arguments) {
+  Outputs outputs;
+  outputs.add("--report", arguments.report);
+  outputs.add("--json", arguments.json);
+  std::vector<NamedFile> inputs = {{"A", arguments.before}, {"B", arguments.now}};
+  if (!arguments.batch.empty()) inputs.push_back({"--batch", arguments.batch});
+  TRY(outputs.check(inputs));
+  const CompensatedModel before = TRY(load_model(arguments.before));
+  const CompensatedModel now = TRY(load_model(arguments.now));
+  const Compared all = TRY(compared(before, now, arguments));
+  warn_of_notes(notes_of(now));
+  const std::string text = text_of(all, before, now);
+  tell(text, {arguments.report, arguments.json});
+  if (!arguments.report.empty())
+    outputs.put("--report",
+                with_pages_beside(comparison_page({before, now, all.difference, all.where, text}), arguments.report));
+  if (!arguments.json.empty()) outputs.put("--json", json_text(comparison_json(all, before, now)));
+  return outputs.write();
+}
+
+}  // namespace
+
+void add_compare_command(CLI::App& app, Action& chosen) {
+  const auto arguments = std::make_shared<CompareArguments>();
+  CLI::App* command = app.add_subcommand(
+      "compare", "Compare two models of one robot: what changed in which parameter, and by how much at which poses");
+  command->add_option("A", arguments->before, "Model file")->required();
+  command->add_option("B", arguments->now, "Model file to hold against it")->required();
+  command->add_option("--batch", arguments->batch,
+                      "Measurements to judge both by (CSV: joints in deg, rails in mm; positions in mm)");
+  command->add_option("--report", arguments->report, "Page to write (HTML); opens without a network");
+  add_json_option(*command, arguments->json);
+  command->callback([arguments, &chosen] { chosen = [arguments] { return compare(*arguments); }; });
+}
+
+}  // namespace trammel::cli

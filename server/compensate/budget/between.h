@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "server/compensate/budget/budget.h"
+#include "server/compensate/compensated_model.h"
+
+/// What is between two models of one robot.
+namespace trammel {
+
+/// A parameter of either model; one that a model does not have is 0 there, on the drawing.
+struct ParameterDifference {
+  std::string name;
+  std::string unit;
+  double before = 0, now = 0;  ///< in `unit`
+  double u95 = 0;              ///< U(k = 2) of the difference, in `unit`
+  [[nodiscard]] double difference() const { return now - before; }
+};
+
+struct ModelDifference {
+  std::vector<ParameterDifference> parameters;  ///< those of `now`, then those of `before` alone
+  /// The predicted poses of `now` minus those of `before`, line by line; `error_rms` is of that difference. Nothing is
+  /// left beyond the two models, so it has no steps to put right.
+  ErrorBudget budget;
+  std::vector<Vector3> moved_B;  ///< m, of each pose, seen from the base
+};
+
+/// `before` and `now` are of one drawing; `poses` are not empty. What both models learned from the same measurements
+/// counts as independent in U: it is then too large.
+[[nodiscard]] ModelDifference difference_between(const CompensatedModel& before, const CompensatedModel& now,
+                                                 const std::vector<PoseContext>& poses);
+
+}  // namespace trammel
