@@ -24,12 +24,13 @@ constexpr std::string_view kPlace = "<nav class=\"beside\"></nav>";
 constexpr std::string_view kMark = "<meta name=\"trammel-page\"";
 
 /// What links call a page of this kind, in their order.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 7> kKinds = {{{"fleet", "fleet"},
+constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kKinds = {{{"fleet", "fleet"},
                                                                                   {"history", "history"},
                                                                                   {"model", "model"},
                                                                                   {"diagnosis", "diagnosis"},
                                                                                   {"health", "health"},
                                                                                   {"remedies", "remedies"},
+                                                                                  {"comparison", "comparison"},
                                                                                   {"program", "corrected program"}}};
 
 /// A mark as a file has it: its texts are escaped.

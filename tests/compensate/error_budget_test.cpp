@@ -9,6 +9,7 @@
 #include <random>
 
 #include "server/base/text_file.h"
+#include "server/compensate/budget/between.h"
 #include "server/compensate/budget/budget_words.h"
 #include "server/compensate/budget/remedies.h"
 #include "server/compensate/model_file.h"
@@ -277,6 +278,54 @@ TEST(ErrorBudget, IsKeptInTheFileOfItsModel) {
   const CompensatedModel model = trained(world, "base, geometry");
   const CompensatedModel read = test::demand(deserialize(serialize(model), "model.json"));
   EXPECT_EQ(in_words(budget_of(read), 40), in_words(budget_of(model), 40));
+}
+
+TEST(ErrorBudget, BetweenTwoModelsNamesWhatChangedFromOneToTheOther) {
+  World before;
+  before.zeros(2) = 0.5 * kDegree;
+  World now = before;
+  now.zeros(3) = 0.4 * kDegree;
+  now.base = Vector3(0.02, 0.01, 0);  // the tracker stands elsewhere: that is no change of the arm
+  const CompensatedModel one = trained(before, "base, geometry"), other = trained(now, "base, geometry");
+  std::vector<PoseContext> poses;
+  for (const Eigen::VectorXd& q : drawn_poses(60)) {
+    PoseContext pose;
+    pose.q = q;
+    pose.tool = one.parts().trained_with.begin()->first;
+    pose.payload = one.parts().trained_with.begin()->second;
+    poses.push_back(pose);
+  }
+  const ModelDifference difference = difference_between(one, other, poses);
+  const BudgetLine& first = difference.budget.beyond_frames.lines.front();
+  EXPECT_EQ(first.line, "zero:4");
+  ASSERT_TRUE(first.value);
+  EXPECT_NEAR(first.value->value, 0.4, 0.02);
+  EXPECT_GT(first.share, 0.9);
+  const BudgetLine* unchanged = difference.budget.line("zero:3");
+  ASSERT_NE(unchanged, nullptr);
+  EXPECT_LT(1e3 * unchanged->alone_rms, 0.2);
+  const auto q4 = std::find_if(difference.parameters.begin(), difference.parameters.end(),
+                               [](const ParameterDifference& one) { return one.name == "q4"; });
+  ASSERT_NE(q4, difference.parameters.end());
+  EXPECT_NEAR(q4->difference(), 0.4 * kDegree, 0.02 * kDegree);
+  EXPECT_GT(std::abs(q4->difference()), q4->u95);
+}
+
+TEST(ErrorBudget, BetweenAModelAndItselfIsNothing) {
+  World world;
+  world.zeros(2) = 0.5 * kDegree;
+  const CompensatedModel model = trained(world, "base, geometry");
+  std::vector<PoseContext> poses;
+  for (const Eigen::VectorXd& q : drawn_poses(20)) {
+    PoseContext pose;
+    pose.q = q;
+    pose.tool = model.parts().trained_with.begin()->first;
+    pose.payload = model.parts().trained_with.begin()->second;
+    poses.push_back(pose);
+  }
+  const ModelDifference difference = difference_between(model, model, poses);
+  EXPECT_EQ(difference.budget.as_it_stands.error_rms, 0);
+  for (const BudgetLine& line : difference.budget.as_it_stands.lines) EXPECT_LT(line.alone_rms, 1e-12) << line.line;
 }
 
 }  // namespace
