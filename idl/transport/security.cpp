@@ -60,7 +60,7 @@ class Folder {
   }
   [[nodiscard]] Result<Certificate> certificate(const char* name) const {
     const auto pem = TRY(text(name));
-    Certificate certificate(PEM_read_bio_X509(bio_ofpem.get(), nullptr, nullptr, nullptr));
+    Certificate certificate(PEM_read_bio_X509(bio_of(pem).get(), nullptr, nullptr, nullptr));
     if (!certificate) return wrong(name, "no certificate in PEM form");
     return certificate;
   }
@@ -109,7 +109,7 @@ Status check_key(const Folder& folder, const X509& certificate) {
         .next("chmod 640 " + folder.path("key.pem"));
   }
   const auto pem = TRY(folder.text("key.pem"));
-  const Key key(PEM_read_bio_PrivateKey(bio_ofpem.get(), nullptr, nullptr, nullptr));
+  const Key key(PEM_read_bio_PrivateKey(bio_of(pem).get(), nullptr, nullptr, nullptr));
   if (!key) return folder.wrong("key.pem", "no private key in PEM form, or one with a password");
   if (X509_check_private_key(&certificate, key.get()) != 1) return folder.wrong("key.pem", "not the key of cert.pem");
   return {};
@@ -119,7 +119,7 @@ Status check_key(const Folder& folder, const X509& certificate) {
 Result<std::string> signed_text(const Folder& folder, const char* name, X509& authority) {
   const auto smime = TRY(folder.text(name));
   BIO* content = nullptr;
-  const Signed parsed(SMIME_read_PKCS7(bio_ofsmime.get(), &content));
+  const Signed parsed(SMIME_read_PKCS7(bio_of(smime).get(), &content));
   const Bio given(content);
   if (!parsed || !given) return folder.wrong(name, "no signed rules in S/MIME form");
   Authorities authorities(X509_STORE_new());

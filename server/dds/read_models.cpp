@@ -185,7 +185,7 @@ Result<ReadModelsReply> Handlers::batch_of(const std::string& cell, const std::s
 Result<ReadModelsReply> Handlers::audit_of(const std::string& cell, std::int64_t since, std::size_t most) const {
   const auto trail = TRY(store_.audit({cell, std::max<std::int64_t>(since, 0), most}));
   ReadModelsReply reply;
-  reply.text(audit_jsontrail.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  reply.text(audit_json(trail).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
   if (const Status fits = check_fits("the audit trail", reply.text().size()); !fits)
     return Failure(fits.error()).next("ask for fewer rows");
   return reply;

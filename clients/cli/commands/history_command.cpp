@@ -114,7 +114,7 @@ Status history(const HistoryArguments& arguments) {
   outputs.put("--json", json_text(history_json(found)));
   TRY(outputs.write());
   tell(fmt::format("cell {}: {} versions, {} parameters moved by more than their uncertainty\n", found.cell,
-                   found.versions.size(), moved_parametersfound.size()),
+                   found.versions.size(), moved_parameters(found).size()),
        {arguments.output, arguments.json});
   return {};
 }
