@@ -78,7 +78,7 @@ Result<StoreCopy> back_up_store(const std::string& from, const std::string& to,
   if (std::error_code error; !fs::exists(from, error))
     return failure(ErrorCode::kNotFound, "no such store").in(from).next("its path stands in the server file as store");
   Result<StoreCopy> copy;
-  TRY(make_store_file(to, [&](const std::string& part) -> Status {
+  const auto make = [&](const std::string& part) -> Status {
     try {
       TRY(copy_pages(from, part, progress));
       copy = check_store_copy(part);
@@ -86,7 +86,8 @@ Result<StoreCopy> back_up_store(const std::string& from, const std::string& to,
     } catch (const DatabaseError& error) {
       return failure(ErrorCode::kInternal, "cannot be copied to {}: {}", to, error.what()).in(from);
     }
-  }));
+  };
+  TRY(make_store_file(to, make));
   return copy;
 }
 

@@ -115,7 +115,7 @@ Result<StoreContent> fill(Database& source, const std::string& from, Database& t
 Result<StoreContent> copy_to_file(Database& source, const std::string& from, const std::string& to,
                                   const Progress& progress) {
   Result<StoreContent> content;
-  TRY(make_store_file(to, [&](const std::string& part) -> Status {
+  const auto make = [&](const std::string& part) -> Status {
     {
       SqliteDatabase target(part, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, kBusyTimeout);
       TRY(prepare_file(target, part));
@@ -124,7 +124,8 @@ Result<StoreContent> copy_to_file(Database& source, const std::string& from, con
       content = fill(source, from, target, to, progress);
     }
     return content.map([](const StoreContent&) {});
-  }));
+  };
+  TRY(make_store_file(to, make));
   return content;
 }
 
