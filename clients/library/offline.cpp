@@ -376,8 +376,8 @@ Result<Model> train(const Cell& cell, std::span<const Batch> batches, const Trai
   const auto batch = checked(batches, *cell.inside().cell, drawn(options.validation_share, options.seed));
   if (!batch) return passed_on(batch);
   if (!options.as_read) {
-    if (auto doubt = doubt_of_first_batch(cell.inside().cell, *batch, options.level))
-      return tl::make_unexpected(to_api(Failure(std::move(*doubt)).in("batch " + batch->id()).value()));
+    const auto first = check_first_batch(cell.inside().cell, *batch, options.level);
+    if (!first) return passed_on(first);
   }
   trammel::TrainOptions how;
   how.looked_at = options.as_read;
@@ -400,12 +400,11 @@ Result<std::string> diagnose(const Cell& cell, std::span<const Batch> batches, c
   how.seed = options.seed;
   how.progress = [&](const std::string& stage, double share) { return goes_on(options.progress, stage, share); };
   const auto found = trammel::diagnose(cell.inside().cell, *batch, how);
-  if (!found) return passed_on(found);
+  if (!found) return tl::make_unexpected(to_api(with_rows_set_aside(found.error(), *batch)));
   return diagnosis_json(*found).dump(2);
 }
 
 Result<Extension> extend(const Cell& cell, std::span<const Batch> batches, const DiagnoseOptions& options) {
-  constexpr double kDiagnosisShare = 0.6;  // of the work
   const auto fits = trainable(cell, {});
   if (!fits) return passed_on(fits);
   const std::shared_ptr<const trammel::Cell>& of = cell.inside().cell;

@@ -32,6 +32,9 @@ constexpr double kHyperparametersOfNone = 3;  // the standard deviation of each 
 constexpr double kFitShare = 0.5;             // of the time for one candidate: the rest goes into leaving out blocks
 constexpr double kGainOfPhysics = 0.9;        // rms with parameters over rms without: a tenth less is worth a diagnosis
 constexpr double kAboveNoise = 1.3;           // rms over the instrument's noise, which a cell's file knows to a tenth
+constexpr Index kMostRows = 900;   // to choose by: each candidate is fitted, and conditioned for each block left out
+constexpr Index kManyRows = 1200;  // of fewer all choose
+constexpr double kChoosing = 0.7;  // of the time, where some rows choose
 
 std::vector<Index> in_order(Index count) {
   std::vector<Index> all(static_cast<std::size_t>(count));
@@ -185,9 +188,11 @@ struct Best {
 
 class Choosing {
  public:
-  Choosing(const BiasProblem& problem, const BiasOptions& options, const ResidualWithout& residual_without,
-           Index most_coupled)
+  /// `problem`: all of `all`, or rows of it by which to choose.
+  Choosing(const BiasProblem& problem, const BiasProblem& all, const BiasOptions& options,
+           const ResidualWithout& residual_without, Index most_coupled)
       : problem_(problem),
+        all_(all),
         poses_(pose_groups(problem.q)),
         options_(options),
         most_coupled_(most_coupled),
@@ -284,9 +289,8 @@ class Choosing {
 
   /// Why the kernel cannot be asked; empty: it can.
   [[nodiscard]] std::string too_many_for(const SpelledBias& bias) const {
-    if (!bias.blocks.empty() && problem_.q.rows() > most_coupled_)
-      return fmt::format("more than {} poses", most_coupled_);
-    if (bias.flange && !check_flange(problem_.q, problem_.features))
+    if (!bias.blocks.empty() && all_.q.rows() > most_coupled_) return fmt::format("more than {} poses", most_coupled_);
+    if (bias.flange && !check_flange(all_.q, all_.features))
       return fmt::format("more than {} numbers at the flange", kMostFlangeNumbers);
     return {};
   }
@@ -338,6 +342,7 @@ class Choosing {
   }
 
   const BiasProblem& problem_;
+  const BiasProblem& all_;
   const std::vector<PoseGroup> poses_;
   const BiasOptions& options_;
   const Index most_coupled_;
@@ -349,6 +354,50 @@ class Choosing {
   Best best_;
   int asked_ = 0;
 };
+
+/// Whole poses, evenly in the order of measuring, of so many rows that choosing does not take long.
+std::vector<Index> rows_to_choose_by(const BiasProblem& problem) {
+  if (problem.q.rows() <= kManyRows) return in_order(problem.q.rows());
+  const std::vector<PoseGroup> poses = pose_groups(problem.q);
+  const std::size_t wanted = std::max<std::size_t>(
+      1, poses.size() * static_cast<std::size_t>(kMostRows) / static_cast<std::size_t>(problem.q.rows()));
+  std::vector<Index> rows;
+  for (std::size_t k = 0; k < wanted; ++k) {
+    const PoseGroup& pose = poses[k * poses.size() / wanted];
+    rows.insert(rows.end(), pose.begin(), pose.end());
+  }
+  std::sort(rows.begin(), rows.end());
+  return rows;
+}
+
+BiasProblem rows_of(const BiasProblem& problem, const std::vector<Index>& rows) {
+  return {problem.q(rows, Eigen::all), problem.residual_B(rows, Eigen::all), problem.sigma(rows),
+          at(problem.features, rows)};
+}
+
+/// What `residual_without` says of the rows `some` without those at `rows` of them.
+std::optional<MatrixXd> left_of(const ResidualWithout& residual_without, const std::vector<Index>& some,
+                                const std::vector<Index>& rows) {
+  const std::optional<MatrixXd> all = residual_without(at(some, rows));
+  return all ? std::optional<MatrixXd>((*all)(some, Eigen::all)) : std::nullopt;
+}
+
+/// `options` whose progress is the part [from, to] of the whole.
+BiasOptions as_share(BiasOptions options, double from, double to) {
+  if (const auto whole = options.progress)
+    options.progress = [whole, from, to](double share) { return whole(from + (to - from) * share); };
+  return options;
+}
+
+/// The model that was found on some rows of `problem`, on all of them: its search goes on from where it ended.
+Result<BiasModel> grown(const BiasModel& model, const BiasProblem& problem, const BiasOptions& options) {
+  BiasState state = model.state();
+  state.q = problem.q;
+  state.residual_B = problem.residual_B;
+  state.sigma = problem.sigma;
+  state.features = model.needs_features() ? problem.features : std::vector<BiasFeatures>();
+  return BiasModel::restore(state).and_then([&](const BiasModel& whole) { return whole.refit(options); });
+}
 
 }  // namespace
 
@@ -364,7 +413,17 @@ Result<ChosenBias> choose_bias(const BiasProblem& problem, const BiasOptions& op
   BiasOptions nothing = options;
   nothing.kernel = "none";
   TRY(BiasModel::fit(problem, nothing));
-  return Choosing(problem, options, residual_without, most_coupled).run();
+  const std::vector<Index> some = rows_to_choose_by(problem);
+  if (std::ssize(some) == problem.q.rows())
+    return Choosing(problem, problem, options, residual_without, most_coupled).run();
+  const BiasProblem part = rows_of(problem, some);
+  ResidualWithout of_part;
+  if (residual_without) of_part = [&](const std::vector<Index>& rows) { return left_of(residual_without, some, rows); };
+  const BiasOptions first = as_share(options, 0, kChoosing), rest = as_share(options, kChoosing, 1);
+  ChosenBias chosen = TRY(Choosing(part, problem, first, of_part, most_coupled).run());
+  chosen.choice.sentence += fmt::format("; chosen by {} of {} rows", part.q.rows(), problem.q.rows());
+  if (chosen.model) chosen.model = TRY(grown(*chosen.model, problem, rest));
+  return chosen;
 }
 
 }  // namespace trammel

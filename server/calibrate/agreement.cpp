@@ -22,6 +22,7 @@ constexpr double kAsked = 3;        // times the stated sigma: the least that a 
 constexpr double kKept = 0.55;      // share of the rows that are fitted: with two bad ones in five, some are spared
 constexpr double kAgreeing = 0.6;   // share that must agree at the end
 constexpr double kMuchLess = 0.25;  // of what was left
+constexpr double kSurelyFar = 2;    // times as far off as a suspect, beside what the drawing leaves
 constexpr double kEquations = 1.5;  // for each parameter, of the rows that are fitted
 constexpr std::size_t kMostRows = 300;  // evenly drawn beyond, while rows are looked for
 constexpr int kMostSteps = 12;
@@ -72,15 +73,17 @@ class RowSearch {
     const MeasurementBatch few = only(batch_, drawn(all.size(), kMostRows));
     std::optional<CalibrationResult> found;
     const auto begin_at = [&](std::optional<CalibrationResult> start) {
-      std::optional<CalibrationResult> one = concentrated(few, std::move(start));
+      std::optional<CalibrationResult> one = concentrated(few, std::move(start), sources_);
       if (one && (!found || left(*one) < left(*found))) found = std::move(one);
     };
     begin_at(fitted(sources_, few));
     begin_at(fitted(frames(), few));
     if (!found) begin_at(placed_by_few(few));
-    if (!found || left(*found) > kMuchLess * before) return all;
-    const Rows rows = readmitted(std::move(*found), before);
-    return static_cast<double>(rows.size()) < kAgreeing * static_cast<double>(all.size()) ? all : rows;
+    if (!found) return led_to_by_frames(few);
+    if (left(*found) > kMuchLess * before) return all;
+    const std::optional<Readmitted> settled = readmitted(std::move(*found), sources_);
+    if (!settled || left(settled->found) > kMuchLess * before) return all;
+    return enough(settled->rows);
   }
 
  private:
@@ -157,36 +160,64 @@ class RowSearch {
     return equations >= kEquations * static_cast<double>(found.parameters.size());
   }
 
-  /// What is found on the rows that fit it best.
+  /// What is found of `sources` on the rows that fit it best.
   [[nodiscard]] std::optional<CalibrationResult> concentrated(const MeasurementBatch& few,
-                                                              std::optional<CalibrationResult> start) const {
+                                                              std::optional<CalibrationResult> start,
+                                                              const std::vector<std::string>& sources) const {
     Rows kept;
     for (int step = 0; start && step < kMostSteps; ++step) {
       Rows next = nearest(farness(*start, few));
       if (next == kept) break;
       kept = std::move(next);
       const MeasurementBatch rows = only(few, kept);
-      start = fitted(sources_, rows);
+      start = fitted(sources, rows);
       if (start && !has_enough(rows, *start)) return std::nullopt;
     }
     return start;
   }
 
-  /// All rows that fit as well as those that were kept; all, where no more than others are left with much less.
-  [[nodiscard]] Rows readmitted(CalibrationResult found, double before) const {
+  /// The rows that are no farther off than so many times a good one may be.
+  [[nodiscard]] Rows within(double limit, const CalibrationResult& found) const {
+    const Eigen::VectorXd off = farness(found, batch_);
+    Rows rows;
+    for (Eigen::Index i = 0; i < off.size(); ++i)
+      if (off(i) <= limit) rows.push_back(static_cast<std::size_t>(i));
+    return rows;
+  }
+
+  struct Readmitted {
+    CalibrationResult found;
+    Rows rows;
+  };
+  /// All rows that fit as well as those that were kept, and what is found of `sources` on them.
+  [[nodiscard]] std::optional<Readmitted> readmitted(CalibrationResult found,
+                                                     const std::vector<std::string>& sources) const {
     Rows kept;
     for (int step = 0; step < kMostSteps; ++step) {
-      const Eigen::VectorXd off = farness(found, batch_);
-      Rows next;
-      for (Eigen::Index i = 0; i < off.size(); ++i)
-        if (off(i) <= 1) next.push_back(static_cast<std::size_t>(i));
+      Rows next = within(1, found);
       if (next == kept) break;
       kept = std::move(next);
-      auto again = fitted(sources_, only(batch_, kept));
-      if (!again) return all_rows(batch_.measurements.size());
+      auto again = fitted(sources, only(batch_, kept));
+      if (!again) return std::nullopt;
       found = std::move(*again);
     }
-    return left(found) > kMuchLess * before ? all_rows(batch_.measurements.size()) : kept;
+    return Readmitted{std::move(found), std::move(kept)};
+  }
+
+  /// Of rows that are too few to find all sources on some of them, those that base and tool alone lead to: what is off
+  /// by twice as much as a suspect beside all that the drawing leaves does not agree.
+  [[nodiscard]] Rows led_to_by_frames(const MeasurementBatch& few) const {
+    const std::vector<std::string> sources = frames();
+    std::optional<CalibrationResult> found = concentrated(few, fitted(sources, few), sources);
+    const std::optional<Readmitted> settled =
+        found ? readmitted(std::move(*found), sources) : std::optional<Readmitted>();
+    return settled ? enough(within(kSurelyFar, settled->found)) : all_rows(batch_.measurements.size());
+  }
+
+  /// `rows`; all, where they are too few to be right.
+  [[nodiscard]] Rows enough(Rows rows) const {
+    Rows all = all_rows(batch_.measurements.size());
+    return static_cast<double>(rows.size()) < kAgreeing * static_cast<double>(all.size()) ? all : rows;
   }
 
   const std::shared_ptr<const Cell>& cell_;

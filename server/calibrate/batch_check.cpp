@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "server/calibrate/gauges/gauge_doubt.h"
 #include "server/calibrate/orientation_check.h"
 #include "server/measurement/gauges.h"
 #include "server/measurement/reading_doubt.h"
@@ -33,7 +34,8 @@ std::optional<Error> doubt_of_sessions(const MeasurementBatch& batch, const Cell
 }  // namespace
 
 std::optional<Error> batch_doubt(const MeasurementBatch& batch, const Cell& cell) {
-  return doubt_of_sessions(batch, cell, [](const ReadingLook& seen) { return seen.doubt; });
+  if (auto doubt = doubt_of_sessions(batch, cell, [](const ReadingLook& seen) { return seen.doubt; })) return doubt;
+  return has_gauges(batch) ? gauge_doubt(batch, cell) : std::nullopt;
 }
 
 std::optional<Error> reading_doubt(const MeasurementBatch& batch, const Cell& cell) {

@@ -25,8 +25,8 @@ double fading(double x, double from, double to) {
 }  // namespace
 
 bool Domain::in_range(const JointVector& q) const {
-  const Eigen::ArrayXd margin = kDomainMargin * (q_max - q_min).array() + kLeastMargin;
-  return (q.array() >= q_min.array() - margin).all() && (q.array() <= q_max.array() + margin).all();
+  const Eigen::ArrayXd beyond = margin * (q_max - q_min).array() + kLeastMargin;
+  return (q.array() >= q_min.array() - beyond).all() && (q.array() <= q_max.array() + beyond).all();
 }
 
 double Domain::bias_weight(const JointVector& q, double prior_share) const {
@@ -34,8 +34,8 @@ double Domain::bias_weight(const JointVector& q, double prior_share) const {
   for (Eigen::Index j = 0; j < q.size(); ++j) {
     const double range = q_max(j) - q_min(j);
     const double beyond = std::max(q_min(j) - q(j), q(j) - q_max(j));
-    const double margin = kDomainMargin * range + kLeastMargin;
-    weight *= fading(beyond, margin, margin + kRangeFade * range + kLeastFade);
+    const double full = kDomainMargin * range + kLeastMargin;
+    weight *= fading(beyond, full, full + kRangeFade * range + kLeastFade);
   }
   // Shares span decades, so the fade is one of their logarithm.
   const double limit = std::max(prior_share_limit, kKnownExactly);

@@ -279,9 +279,10 @@ ErrorPrediction CompensatedModel::predict(const PoseContext& asked, const Learne
   prediction.X_BT_nominal = pose.X_BW * physics.nominal_pose_W(context);
   prediction.X_BT_predicted = pose.X_BW * physics.pose_W(context, physics.values, &pose.J_W);
   const Matrix3 unsaid = covariance_of_unsaid(context, !asked.temperature, prediction.X_BT_predicted.translation());
-  const Domain domain{parts().q_min, parts().q_max, parts().prior_share_limit};
+  Domain domain{parts().q_min, parts().q_max, parts().prior_share_limit};
   const bool trained_with = learned_with(context.tool, context.payload);
   const std::optional<WhatWasMeasured>& measured = parts().measured;
+  if (measured) domain.margin = measured->range_margin();
   prediction.in_domain =
       trained_with && domain.in_range(context.q) && (!measured || measured->is_near(cell().robot, context.q));
   pose.growth = domain.growth(context.q, parts().extrapolation_slope, cell().robot);

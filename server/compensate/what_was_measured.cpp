@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 
@@ -13,10 +14,15 @@ namespace trammel {
 
 namespace {
 
-constexpr double kNeighbour = 0.95;     // of the poses have their neighbour within the distance that counts
-constexpr double kBeyond = 1.5;         // times it: fresh poses lie between the measured ones, and a little outside
-constexpr double kFew = 4;              // among n poses the distance is known to 1 + 4/n
-constexpr double kLeastReach = 0.05;    // of the region's diagonal, where poses stand in clusters
+constexpr double kNeighbour = 0.95;   // of the poses have their neighbour within the distance that counts
+constexpr double kBeyond = 1.5;       // times it: fresh poses lie between the measured ones, and a little outside
+constexpr double kFew = 4;            // among n poses the distance is known to 1 + 4/n
+constexpr double kLeastReach = 0.05;  // of the region's diagonal, where poses stand in clusters
+constexpr Eigen::Index kFewestOfTail = 12, kLeastTail = 2, kMostTail = 6;  // places; of a tail the outermost ones
+constexpr double kTailScales = 7;      // 1 of 1000 places is farther out; the reach ends it sooner where they are many
+constexpr double kUsualMargin = 0.05;  // of a joint's range
+constexpr double kMarginOfFew = 45;    // over n² places, beside it: what a Latin hypercube of n leaves at its edges
+constexpr double kMostMargin = 0.1;
 constexpr double kRounding = 1e-6;      // m
 constexpr Eigen::Index kPlaces = 2000;  // at most, evenly among the poses: each prediction looks at all of them
 constexpr int kCells = 24;              // of the box along each axis
@@ -49,6 +55,26 @@ Eigen::MatrixXd along_outline(const Eigen::Matrix3Xd& places) {
   return directions * places.topRows<2>();
 }
 
+/// 16, m: how far others of the same kind come beyond the outermost place in each direction of the outline, by how
+/// thinly the last places there are spread: times the mean by which they exceed the next one (of a tail that falls off
+/// exponentially, its scale). As far as the direction leads away from the base's axis: what lies behind it is another
+/// region, however few the places in front are.
+Eigen::VectorXd beyond_outermost(const Eigen::MatrixXd& along) {
+  const Eigen::VectorXd outermost = along.rowwise().maxCoeff();
+  const double farthest = outermost.maxCoeff();
+  Eigen::VectorXd beyond = Eigen::VectorXd::Zero(along.rows());
+  if (along.cols() < kFewestOfTail || farthest <= 0) return beyond;
+  const Eigen::Index last = std::clamp<Eigen::Index>(along.cols() / 5, kLeastTail, kMostTail);
+  for (Eigen::Index d = 0; d < along.rows(); ++d) {
+    std::vector<double> places(static_cast<std::size_t>(along.cols()));
+    Eigen::VectorXd::Map(places.data(), along.cols()) = along.row(d).transpose();
+    std::partial_sort(places.begin(), places.begin() + last + 1, places.end(), std::greater<>());
+    const double scale = Eigen::VectorXd::Map(places.data(), last).mean() - places[static_cast<std::size_t>(last)];
+    beyond(d) = kTailScales * scale * std::clamp(outermost(d) / farthest, 0.0, 1.0);
+  }
+  return beyond;
+}
+
 /// How far other poses may be from the places.
 void add_reach(WhatWasMeasured& measured) {
   const Eigen::Matrix3Xd& places = measured.flange_B;
@@ -60,7 +86,9 @@ void add_reach(WhatWasMeasured& measured) {
   const double least = kLeastReach * (places.rowwise().maxCoeff() - places.rowwise().minCoeff()).norm();
   const double few = 1 + kFew / static_cast<double>(places.cols());
   measured.reach = std::max(kBeyond * few * within(kNeighbour), least) + kRounding;
-  measured.outline = along_outline(places).rowwise().maxCoeff().array() + std::max(within(0.5), least) + kRounding;
+  const Eigen::MatrixXd along = along_outline(places);
+  measured.outline = along.rowwise().maxCoeff().array() +
+                     beyond_outermost(along).array().max(std::max(within(0.5), least)) + kRounding;
 }
 
 /// One row of each joint vector, evenly chosen where there are too many.
@@ -150,6 +178,11 @@ bool WhatWasMeasured::is_near(const Chain& robot, const JointVector& q) const {
   const Vector3 place = robot.flange_pose(q).translation();
   const bool inside = outline.size() == 0 || (along_outline(place).array() <= outline.array()).all();
   return inside && nearest(flange_B, place) <= *reach;
+}
+
+double WhatWasMeasured::range_margin() const {
+  const double places = std::max(1.0, static_cast<double>(flange_B.cols()));
+  return std::min(kMostMargin, kUsualMargin + kMarginOfFew / (places * places));
 }
 
 WhatWasMeasured what_was_measured(const PhysicalModel& physics, const MeasurementBatch& batch) {

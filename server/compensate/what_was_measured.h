@@ -34,12 +34,16 @@ struct WhatWasMeasured {
 
   /// Whether the nominal flange at `q` is within reach of a place where it was measured, and inside their outline.
   [[nodiscard]] bool is_near(const Chain& robot, const JointVector& q) const;
+  /// Of a joint's range, how far beyond that of these poses others of the same kind come: a twentieth, more where they
+  /// are few.
+  [[nodiscard]] double range_margin() const;
 };
 
 /// Of the poses of `batch`, which `physics` knows the tools of. `reach` follows the distances between the poses
 /// themselves: 1.5 times that within which 95 % of them have a neighbour, more where they are few, and no less than a
-/// twentieth of the region. The outline goes beyond the places by the median distance between neighbours. What stands
-/// at one joint vector is one place and no neighbour of itself.
+/// twentieth of the region. The outline goes beyond the places by the median distance between neighbours, and away from
+/// the base by more where the outermost places are thinly spread: never towards the far side. What stands at one joint
+/// vector is one place and no neighbour of itself.
 [[nodiscard]] WhatWasMeasured what_was_measured(const PhysicalModel& physics, const MeasurementBatch& batch);
 
 /// The same for people, each part by itself. Of a model without it, parts are `not on record`.

@@ -9,6 +9,7 @@
 #include "server/measurement/pose_columns.h"
 #include "server/measurement/reading/arm_fit.h"
 #include "server/measurement/reading/catalogue.h"
+#include "server/measurement/reading_units.h"
 
 namespace trammel {
 
@@ -101,7 +102,8 @@ class Look {
     if (given_->off > kFollow) return seen;
     seen.zeros = given_->arm.head(cell_.robot.size());
     if (given_->base_turn_stddev < kCertainBase) seen.X_WB = given_->X_WB;
-    seen.doubt = of_some_rows();
+    seen.doubt = of_units();
+    if (!seen.doubt) seen.doubt = of_some_rows();
     if (!seen.doubt) seen.doubt = of_zero();
     if (!seen.doubt) seen.doubt = of_sigma();
     if (seen.doubt) return seen;
@@ -115,6 +117,7 @@ class Look {
   [[nodiscard]] bool is_much_better(const Tried& tried) const;
   void keep_best(std::vector<Tried> tried);
   [[nodiscard]] Error of_reading() const;
+  [[nodiscard]] std::optional<Error> of_units() const;
   [[nodiscard]] std::optional<Error> of_some_rows();
   [[nodiscard]] std::optional<Error> of_zero() const;
   [[nodiscard]] std::optional<Error> of_sigma() const;
@@ -209,6 +212,37 @@ Error Look::of_reading() const {
       .with_text(best.reading->name)
       .next("correct the file if it was meant so")
       .value();
+}
+
+/// Rows that are in another unit than the others.
+std::optional<Error> Look::of_units() const {
+  const std::vector<double> off = distances(table_, cell_, *given_);
+  const double limit = std::max(kBadRow, kBadRowRatio * reading::median(off));
+  for (const UnitOfLength& unit : kUnitsOfLength) {
+    NumberTable table = table_;
+    table.p_W *= unit.factor;
+    const std::vector<double> then = distances(table, cell_, *given_);
+    std::vector<int> rows;
+    double worst = 0, left = 0;
+    for (std::size_t i = 0; i < off.size(); ++i) {
+      if (off[i] <= limit || then[i] > limit) continue;
+      rows.push_back(table_.from[i]->row);
+      worst = std::max(worst, off[i]);
+      left = std::max(left, then[i]);
+    }
+    if (rows.empty()) continue;
+    const bool one = rows.size() == 1;
+    return refused("{} of {} positions {} not follow the joints, by up to {}: {} {}; read in {} {} would fit to {}",
+                   rows.size(), off.size(), one ? "does" : "do", mm(worst), one ? "row" : "rows",
+                   fmt::format("{}", fmt::join(rows, ", ")), unit.name, one ? "it" : "they", mm(left))
+        .of("x_mm,y_mm,z_mm")
+        .at_row(rows.front())
+        .beyond(to_mm(worst), to_mm(limit))
+        .with_text(fmt::format("in {}", unit.name))
+        .next("write all rows in mm")
+        .value();
+  }
+  return std::nullopt;
 }
 
 /// A block of rows whose joints stand in other rows, while the others follow theirs.

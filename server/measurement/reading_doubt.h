@@ -17,7 +17,7 @@
 /// What cannot be told: of positions alone from a tracker that may stand anywhere, which of three axes is mirrored, and
 /// that two of them were exchanged instead; a turned joint 1, which is a turned base; a mistake in a joint that moves
 /// the measured point by less than a millimetre, which does no harm to positions. Single rows are outliers, not
-/// mistakes of reading.
+/// mistakes of reading, but for those that are in another unit of length than the others.
 namespace trammel {
 
 /// What was seen of a batch.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "server/base/units.h"
+#include "server/measurement/reading_units.h"
 
 namespace trammel {
 
@@ -14,7 +15,6 @@ namespace {
 constexpr double kRatio = 3;                  // nominal and real robot differ by millimetres, not by this
 constexpr double kSlack = 0.05;               // m: what a wrong tool or a moved tracker may add in a small batch
 constexpr double kSlackOfSmallAngles = 0.01;  // m: with |q| within 2 pi degrees the tool's share is a tenth
-constexpr double kSmallAngle = 6.4;           // the largest radian value of a joint, two half turns and a little
 constexpr double kUnknownToolLength = 0.5;    // m
 
 /// The smallest and largest possible spread of the nominal tool points, m.
@@ -98,7 +98,7 @@ Status check_spread(const MeasurementBatch& batch, const Cell& cell, const std::
   for (const auto& [tool, group] : group_by_tool(batch, cell.robot)) {
     const NominalSpread nominal = nominal_spread(group.flanges, cell.tools.at(tool));
     const double measured = spread_of(group.measured_W);
-    const bool small_angles = group.largest_angle_deg <= kSmallAngle;
+    const bool small_angles = group.largest_angle_deg <= kMostRadians;
     const double upper = kRatio * nominal.largest + (small_angles ? kSlackOfSmallAngles : kSlack);
     if (measured > upper && small_angles) {
       return refused(

@@ -3,6 +3,8 @@
 #include <cmath>
 
 #include "server/base/units.h"
+#include "server/compensate/model_notes.h"
+#include "server/report/note_json.h"
 
 namespace trammel {
 
@@ -165,6 +167,13 @@ ordered_json health_json(const HealthCheck& check, const CheckedSince& since) {
     one["needs"] = unseen.needs;
     json["not_asked"].push_back(std::move(one));
   }
+  return json;
+}
+
+ordered_json check_json(const HealthCheck& check, const CheckedBatch& batch, const CompensatedModel& model) {
+  const auto& rows = batch.rows().measurements;
+  ordered_json json = health_json(check, {batch.id(), rows.empty() ? "" : rows.front().pose_id});
+  json["notes"] = notes_json(notes_of(model));
   return json;
 }
 

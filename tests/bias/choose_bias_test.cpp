@@ -99,6 +99,39 @@ TEST(ChooseBias, CountsPosesAndNotTheirReflectors) {
   EXPECT_NE(chosen.choice.sentence.find("20 poses are too few"), std::string::npos) << chosen.choice.sentence;
 }
 
+/// Each of the poses of a smooth residual is seen by three reflectors.
+BiasProblem seen_by_three(Index poses, std::uint64_t seed) {
+  const BiasProblem once = smooth_problem(poses, seed);
+  BiasProblem problem = smooth_problem(3 * poses, seed);
+  std::mt19937_64 random(seed + 40);
+  for (Index i = 0; i < 3 * poses; ++i) {
+    problem.q.row(i) = once.q.row(i / 3);
+    problem.residual_B.row(i) = once.residual_B.row(i / 3);
+    for (double& value : problem.residual_B.row(i)) value += once.sigma[0] * normal(&random);
+  }
+  return problem;
+}
+
+TEST(ChooseBias, SomeOfManyRowsChooseByWholePosesAndAllAreLearned) {
+  const BiasProblem problem = seen_by_three(500, 7);
+  std::size_t largest = 0;
+  const auto without = [&](const std::vector<Index>& block) -> MatrixXd {
+    largest = std::max(largest, block.size());
+    EXPECT_EQ(block.size() % 3, 0u) << "whole poses";
+    return problem.residual_B;
+  };
+  const ChosenBias chosen = choose_bias(problem, {}, without).value();
+  EXPECT_EQ(chosen.choice.kernel, "se") << chosen.choice.sentence;
+  EXPECT_TRUE(chosen.choice.sentence.ends_with("; chosen by 900 of 1500 rows")) << chosen.choice.sentence;
+  EXPECT_LE(largest, 120u);
+  ASSERT_TRUE(chosen.model);
+  EXPECT_EQ(chosen.model->state().q.rows(), 1500);
+  BiasOptions all;
+  all.kernel = "se";
+  const BiasModel searched = BiasModel::fit(problem, all).value();
+  EXPECT_LT(chosen.model->report().leave_one_out_rms, 1.02 * searched.report().leave_one_out_rms);
+}
+
 TEST(ChooseBias, ThePhysicsThatKnewABlockIsNotAskedAboutIt) {
   const BiasProblem problem = smooth_problem(80, 5);
   std::vector<std::size_t> asked;

@@ -185,6 +185,25 @@ TEST(Agreement, BadDistancesAreNamedAsBadPositionsAre) {
   }
 }
 
+TEST(Agreement, DistancesThatAreFarOffAmongFewAreNamed) {
+  for (const bool known : {true, false}) {
+    const std::string places = known ? "" : test::unknown_places(test::three_corners());
+    for (std::uint64_t seed = 3; seed <= 5; ++seed) {
+      const test::GaugedArm arm = test::gauged_arm(seed, test::three_corners(), places);
+      for (const double share : {0.02, 0.1}) {
+        for (const double off_mm : {60.0, 400.0}) {
+          std::vector<test::GaugeRow> rows = test::wire_rows(arm, 60, seed);
+          const std::set<int> bad = spoil(rows, share, off_mm, 4);
+          EXPECT_EQ(named(arm.cell, test::gauge_batch(arm, rows, 0.05, seed)), bad)
+              << (known ? "known, " : "unknown, ") << share << ", " << off_mm << ", seed " << seed;
+        }
+      }
+      const std::vector<test::GaugeRow> good = test::wire_rows(arm, 60, seed);
+      EXPECT_FALSE(agreement(arm.cell, kM3, test::gauge_batch(arm, good, 0.05, seed))) << "seed " << seed;
+    }
+  }
+}
+
 TEST(Agreement, AGoodBatchIsNotAsked) { EXPECT_FALSE(agreement(test::cell_7(), kM3, positions(60, 21))); }
 
 TEST(Agreement, AModelThatLacksSomethingHasNoBadRows) {

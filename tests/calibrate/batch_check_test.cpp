@@ -4,6 +4,7 @@
 
 #include "server/measurement/checked_batch.h"
 #include "tests/support/demand.h"
+#include "tests/support/gauged_arm.h"
 #include "tests/support/misread_batch.h"
 #include "tests/support/one_point.h"
 #include "tests/support/virtual_robot.h"
@@ -125,6 +126,77 @@ TEST(BatchCheck, PositionsThatAreInUmAreStillNamed) {
   const auto said = test::said_of(std::move(batch), *cell);
   ASSERT_TRUE(said);
   EXPECT_EQ(said->text, "with all positions in um") << sentence(*said);
+}
+
+TEST(BatchCheck, ARowInAnotherUnitThanTheOthersIsNamedWithIt) {
+  for (const auto& [unit, factor] : {std::pair("metres", 1e-3), std::pair("inches", 1 / 25.4)}) {
+    for (const bool known : {true, false}) {
+      auto cell = std::make_shared<Cell>(*test::cell_7());
+      if (!known) {
+        cell->X_WB.reset();
+        cell->tools["spindle"].reset();
+      }
+      MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), 60, 3, known);
+      for (std::size_t i = 0; i < batch.measurements.size(); ++i) batch.measurements[i].row = static_cast<int>(i) + 2;
+      batch.measurements[16].p_W *= factor;
+      const auto one = test::said_of(batch, *cell);
+      ASSERT_TRUE(one) << unit << (known ? "" : ", base and tool unknown");
+      EXPECT_EQ(one->row, 18) << sentence(*one);
+      EXPECT_EQ(one->text, std::string("in ") + unit) << sentence(*one);
+      batch.measurements[40].p_W *= factor;
+      const auto two = test::said_of(batch, *cell);
+      ASSERT_TRUE(two);
+      EXPECT_NE(two->message.find("rows 18, 42; read in"), std::string::npos) << sentence(*two);
+    }
+  }
+}
+
+TEST(BatchCheck, DistancesInAnotherUnitAreNamedAllOfThemAndSingleRows) {
+  for (const bool known : {true, false}) {
+    const test::GaugedArm arm =
+        test::gauged_arm(3, test::three_corners(), known ? "" : test::unknown_places(test::three_corners()));
+    const MeasurementBatch good = test::gauge_batch(arm, test::wire_rows(arm, 80, 3), 0.05, 3);
+    const auto nothing = batch_doubt(good, *arm.cell);
+    EXPECT_FALSE(nothing) << sentence(*nothing);
+    for (const auto& [unit, factor] : {std::pair("in metres", 1e-3), std::pair("in inches", 1 / 25.4)}) {
+      MeasurementBatch all = good, one = good;
+      for (Measurement& m : all.measurements) m.gauge->value *= factor;
+      one.measurements[16].gauge->value *= factor;
+      const auto of_all = batch_doubt(all, *arm.cell), of_one = batch_doubt(one, *arm.cell);
+      ASSERT_TRUE(of_all && of_one) << unit << (known ? "" : ", places unknown");
+      EXPECT_EQ(of_all->text, unit) << sentence(*of_all);
+      EXPECT_EQ(of_one->text, unit) << sentence(*of_one);
+      EXPECT_EQ(of_one->row, good.measurements[16].row) << sentence(*of_one);
+    }
+  }
+}
+
+TEST(BatchCheck, TouchesThatCountTheOtherWayOrInInchesAreNamed) {
+  const test::GaugedArm arm = test::gauged_arm(23, {}, "{table: {xyz_mm: [1200, 0, 300], plane_normal: [0, 0, 1]}}");
+  std::vector<test::GaugeRow> rows = test::position_rows(arm, 120, 23);
+  for (test::GaugeRow& row : rows) {
+    row.column = "touch_mm";
+    row.anchor = "table";
+    row.value_mm = row.p_mm.z() - 300;
+  }
+  const MeasurementBatch good = test::gauge_batch(arm, rows, 0.05, 23);
+  const auto nothing = batch_doubt(good, *arm.cell);
+  EXPECT_FALSE(nothing) << sentence(*nothing);
+  for (const auto& [reading, factor] : {std::pair("with the other sign", -1.0), std::pair("in inches", 1 / 25.4)}) {
+    MeasurementBatch misread = good;
+    for (Measurement& m : misread.measurements) m.gauge->value *= factor;
+    const auto said = batch_doubt(misread, *arm.cell);
+    ASSERT_TRUE(said) << reading;
+    EXPECT_EQ(said->text, reading) << sentence(*said);
+  }
+}
+
+TEST(BatchCheck, ARowThatIsFarOffOtherwiseIsInNoOtherUnit) {
+  MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), 60, 3);
+  batch.measurements[16].p_W += Vector3(0.5, -0.3, 0.2);
+  batch.measurements[17].p_W *= 0.5;
+  const auto said = test::said_of(batch, *test::cell_7());
+  EXPECT_FALSE(said) << sentence(*said);
 }
 
 TEST(BatchCheck, WhatIsRefusedForALimitSaysUnderWhichReadingItWouldNotBe) {

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "server/base/units.h"
 #include "tests/support/refusal.h"
+#include "tests/support/virtual_robot.h"
 
 namespace trammel {
 namespace {
@@ -53,6 +56,24 @@ TEST(JointList, WritesWhatIsKnownOfEachPose) {
   const auto list = parse_joint_csv(text, "j.csv");
   ASSERT_TRUE(list) << list.error().message;
   EXPECT_EQ(to_csv(*list), text);
+}
+
+TEST(JointList, OneInRadiansIsRefusedWithItsUnitAndOneNearAPlaceIsNot) {
+  const auto of_six = [](double size) {
+    std::string text = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\n";
+    for (int row = 0; row < 8; ++row)
+      text += fmt::format("{0:.4f},{1:.4f},{0:.4f},{1:.4f},{2:.4f},{2:.4f}\n", size * std::sin(row),
+                          size * 0.5 * std::cos(row), size * std::sin(2.0 * row));
+    return parse_joint_csv(text, "j.csv").and_then([](const JointList& read) {
+      return check_against_cell(read, *test::cell_7());
+    });
+  };
+  const auto radians = of_six(3);
+  ASSERT_FALSE(radians);
+  EXPECT_EQ(refusal_of(radians), Refusal("j.csv", {}, "q1_deg"));
+  EXPECT_NE(radians.error().next.find("radians"), std::string::npos);
+  EXPECT_TRUE(of_six(0.9)) << "all within a degree";
+  EXPECT_TRUE(of_six(25)) << "some farther than radians go";
 }
 
 TEST(JointList, ResolvesTheOnlyTool) {

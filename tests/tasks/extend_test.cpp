@@ -151,7 +151,9 @@ TEST_F(Extend, IsJudgedAsAServiceJudgesAndNeverByFewerThanThirtyPoses) {
       << extension.why_not();
 }
 
-TEST_F(Extend, FilesHoldOutWhatAServiceDrawsWhereTheBatchDoesNotSay) {
+TEST_F(Extend, FilesHoldOutWhatAServiceDrawsAndWhatTheBatchSays) {
+  const CheckedBatch said = test::demand(check_against_cell(batch_, *cell_, held_out_to_extend(1)));
+  EXPECT_EQ(said.held_out().measurements.size(), 30U + 18U) << "a fifth of those that the batch does not hold out";
   for (Measurement& m : batch_.measurements) m.set = MeasurementSet::kUnassigned;
   const CheckedBatch drawn = test::demand(check_against_cell(batch_, *cell_, held_out_to_extend(1)));
   EXPECT_EQ(drawn.held_out().measurements.size(), 34U);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <filesystem>
 #include <new>
@@ -13,8 +14,11 @@
 #include "server/base/hash.h"
 #include "server/compensate/model_file.h"
 #include "server/plan/plan.h"
+#include "server/report/health_json.h"
 #include "server/simulate/simulate.h"
+#include "server/tasks/check/check.h"
 #include "server/tasks/train/extend.h"
+#include "tests/support/demand.h"
 #include "tests/support/from_rows.h"
 #include "tests/support/refusal.h"
 #include "tests/support/small_cell.h"
@@ -625,11 +629,12 @@ TEST_F(TrainerTest, RefusesToImportWhatIsNotOfTheCell) {
 }
 
 /// Joint 3 of the small cell oscillates, which its error sources do not know.
-MeasurementBatch batch_of_an_oscillating_joint(const std::shared_ptr<const Cell>& cell) {
+MeasurementBatch batch_of_an_oscillating_joint(const std::shared_ptr<const Cell>& cell, int poses = 120,
+                                               std::uint64_t seed = 1) {
   VirtualRobot robot{make_physical_model(cell, {"base", "gear_transmission:3@2"}).value(), 20e-6, 60e-6, {}};
   robot.truth.values(0) = 1e-3;
   robot.truth.values.tail<2>() = Eigen::Vector2d(1e-4, 2e-4);
-  return simulate(robot, plan_poses(*cell, {120, 1}).value(), {}).value();
+  return simulate(robot, plan_poses(*cell, {poses, seed}).value(), {}).value();
 }
 std::string csv_of_an_oscillating_joint(const std::shared_ptr<const Cell>& cell) {
   return to_csv(batch_of_an_oscillating_joint(cell));
@@ -662,6 +667,48 @@ TEST_F(TrainerTest, PutsTheExtendedModelInForceBecauseItIsBetterAndKeepsWhatWasA
   EXPECT_TRUE(level.starts_with("base,")) << level;
   const JobProgress again = retrain({"lt-07"});
   EXPECT_EQ(store_->models("cell-7")->at(2).level, level) << again.what;
+}
+
+TEST_F(TrainerTest, WhereNoModelIsInForceItsOwnPosesAloneJudgeAnExtensionAsOnFiles) {
+  start();
+  const auto cell = cells_.at("cell-7");
+  MeasurementBatch noisy = batch_of_an_oscillating_joint(cell, 60, 2);
+  for (std::size_t i = 0; i < noisy.measurements.size(); ++i) {
+    const auto k = static_cast<double>(i);
+    noisy.measurements[i].p_W += 3e-3 * Vector3(std::sin(37 * k), std::cos(53 * k), std::sin(29 * k));
+  }
+  watch_.wait_until_finished(trainer_->submit("cell-7", "noisy", to_csv(noisy), "client:1").value());
+  ASSERT_EQ(in_force(), 0) << "its model waits for a person";
+
+  const std::string text = to_csv(batch_of_an_oscillating_joint(cell, 60, 1));
+  const JobProgress done = watch_.wait_until_finished(trainer_->diagnose("cell-7", "", text, true).value());
+  const CheckedBatch batch = test::demand(
+      check_against_cell(test::demand(parse_batch_csv(text, "b.csv")), *cell, held_out_to_extend(options_.seed)));
+  DiagnoseOptions options;
+  options.seed = options_.seed;
+  TrainOptions training;
+  training.seed = options_.seed;
+  const Applied on_files = test::demand(applied(cell, batch, test::demand(diagnose(cell, batch, options)), training));
+  EXPECT_NE(on_files.why_not.find("12 poses are held out to judge by"), std::string::npos) << on_files.why_not;
+  EXPECT_NE(done.what.find(on_files.why_not), std::string::npos) << done.what << "\non files: " << on_files.why_not;
+}
+
+TEST_F(TrainerTest, ACheckSaysWhatItSaysOnFilesWithTheNotesOfTheModelInForce) {
+  start();
+  train("lt-07");
+  const auto cell = cells_.at("cell-7");
+  const std::string text = csv({.poses = 20, .seed = 2});
+  const std::int64_t job = trainer_->check("cell-7", "", text, {}).value();
+  const JobProgress done = watch_.wait_until_finished(job);
+  ASSERT_EQ(done.stage, JobStage::kDone) << done.what;
+  const CheckedBatch batch = test::demand(check_against_cell(test::demand(parse_batch_csv(text, "b.csv")), *cell));
+  const CompensatedModel& model = registry_->in_force("cell-7")->model;
+  const auto on_files = check_json(test::demand(check_robot(model, *cell, batch, {})), batch, model);
+  const auto told = nlohmann::ordered_json::parse(trainer_->diagnosis(job)->findings);
+  ASSERT_FALSE(on_files["notes"].empty()) << "nobody has confirmed the robot file";
+  for (const auto& [key, value] : on_files.items()) EXPECT_TRUE(told.contains(key)) << key;
+  for (const char* key : {"verdict", "why", "notes", "tolerance_mm", "rms_mm", "model"})
+    EXPECT_EQ(told[key], on_files[key]) << key;
 }
 
 TEST_F(TrainerTest, APoseHeldOutThatFitsNeitherModelDoesNotJudgeAnExtensionAndIsNamed) {

@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <cstdio>
 #include <filesystem>
 #include <limits>
 #include <optional>
@@ -10,6 +11,7 @@
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/notes_text.h"
 #include "server/base/json_guard.h"
+#include "server/base/plain_text.h"
 #include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
@@ -19,9 +21,8 @@
 #include "server/report/cell_health.h"
 #include "server/report/health_json.h"
 #include "server/report/health_page.h"
-#include "server/report/note_json.h"
 #include "server/report/pages_beside.h"
-#include "server/robot/cell_rules.h"
+#include "server/tasks/check/check.h"
 
 namespace trammel::cli {
 
@@ -76,6 +77,19 @@ std::string check_text(const nlohmann::ordered_json& check) {
          due_text(check);
 }
 
+/// The notes of the model that a service checked against, as warn_of_notes() tells them.
+void warn_of_notes_in(const nlohmann::ordered_json& check) {
+  if (!check.contains("notes") || !check["notes"].is_array()) return;
+  for (const auto& note : check["notes"]) {
+    const bool whole = note.is_object() && note.contains("severity") && note["severity"].is_string() &&
+                       note.contains("text") && note["text"].is_string();
+    if (!whole) continue;
+    const auto severity = note["severity"].get<std::string>();
+    if (severity == to_text(Note::Severity::kInfo)) continue;
+    std::fputs(shown_lines(fmt::format("{}: {}\n", severity, note["text"].get<std::string>())).c_str(), stderr);
+  }
+}
+
 Status check_outputs(const CheckArguments& arguments) {
   Outputs outputs;
   outputs.add("--report", arguments.report);
@@ -117,6 +131,7 @@ Status check_at_service(const CheckArguments& arguments) {
   }());
   if (end.stage == "failed") return refused("job {} of cell {} failed: {}", end.job, end.cell, end.what).of("job");
   const auto json = TRY(found_by(*session, model.cell, job));
+  warn_of_notes_in(json);
   tell(check_text(json), {arguments.json, arguments.report});
   if (const Status written = write_report(json, {model.cell, batch_name(arguments.batch), unix_now()}, arguments);
       !written)
@@ -145,22 +160,15 @@ Status check(const CheckArguments& arguments) {
   const CheckedBatch batch = TRY(read_batch(arguments.batch).and_then([&](MeasurementBatch read) {
     return check_against_cell(std::move(read), model.cell());
   }));
-  HealthOptions options;
-  const CellRules rules = TRY(rules_of(model.cell()));
-  options.tolerance = rules.tolerance.value_or(kUsualTolerance);
-  if (arguments.tolerance_mm) options.tolerance = *arguments.tolerance_mm * from_mm(1);
-  options.new_tool = arguments.new_tool;
-  std::vector<DriftSeen> earlier = TRY(earlier_drift(arguments.earlier));
-  options.earlier = std::move(earlier);
-  const HealthCheck health = TRY(check_health(model, batch, options));
-  const auto& rows = batch.rows().measurements;
-  auto json = health_json(health, {batch.id(), rows.empty() ? "" : rows.front().pose_id});
-  const std::vector<Note> notes = notes_of(model);
-  warn_of_notes(notes);
-  json["notes"] = notes_json(notes);
+  CheckAsked asked;
+  if (arguments.tolerance_mm) asked.tolerance = *arguments.tolerance_mm * from_mm(1);
+  asked.new_tool = arguments.new_tool;
+  asked.earlier = TRY(earlier_drift(arguments.earlier));
+  const HealthCheck health = TRY(check_robot(model, model.cell(), batch, std::move(asked)));
+  const auto json = check_json(health, batch, model);
+  warn_of_notes(notes_of(model));
   tell(health_text(health), {arguments.json, arguments.report});
-  const Status written = write_report(json, {model.cell().name, batch.id(), unix_now(), &model.cell()}, arguments);
-  if (!written) return written;
+  TRY(write_report(json, {model.cell().name, batch.id(), unix_now(), &model.cell()}, arguments));
   return write_json(arguments.json, json);
 }
 

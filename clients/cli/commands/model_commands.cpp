@@ -138,16 +138,6 @@ nlohmann::ordered_json jump_json(const Jump& jump) {
           {"p_value", jump.p_value}, {"could_also_be", jump.could_also_be}};
 }
 
-/// Refuses what nothing should be learned from, unless there is a model to start from, which has judged the batch, or
-/// somebody has looked at it.
-Status check_first_batch(const TrainArguments& arguments, const std::shared_ptr<const Cell>& cell,
-                         const CheckedBatch& batch) {
-  if (arguments.as_read || !arguments.from.empty()) return {};
-  auto doubt = doubt_of_first_batch(cell, batch, arguments.level);
-  if (!doubt) return {};
-  return Failure(std::move(*doubt)).in("batch " + batch.id());
-}
-
 Status train_model(const TrainArguments& arguments) {
   if (arguments.bias) {
     if (const Status spelled = check_bias_spelling(*arguments.bias); !spelled)
@@ -176,7 +166,8 @@ Status train_model(const TrainArguments& arguments) {
     TRY(hold_against(*options.from, options.refit, cell, batch));
   }
   const auto shared = std::make_shared<const Cell>(std::move(cell));
-  TRY(check_first_batch(arguments, shared, batch));
+  // A model to start from has judged the batch, or somebody has looked at it.
+  if (!arguments.as_read && arguments.from.empty()) TRY(check_first_batch(shared, batch, arguments.level));
   const CompensatedModel model = TRY([&] {
     ProgressLine progress;
     options.progress = [&](const std::string& stage, double share) {

@@ -1,11 +1,14 @@
 #include "server/measurement/files/joint_list.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "server/base/text_file.h"
+#include "server/base/units.h"
 #include "server/measurement/files/csv_table.h"
 #include "server/measurement/pose_check.h"
 #include "server/measurement/pose_columns.h"
+#include "server/measurement/reading_units.h"
 
 namespace trammel {
 
@@ -55,12 +58,38 @@ std::string to_csv(const JointList& list) {
   return text;
 }
 
+namespace {
+
+/// Refuses a list whose joints look like radians: all of them small, and many of them turned by several degrees.
+Status check_degrees(const JointList& list, const Chain& robot) {
+  constexpr std::size_t kFewestPoses = 6;
+  constexpr int kFewestTurned = 4;  // joints: an arm with so many has no pose where all of them are near zero
+  constexpr double kTurned = 1;     // rad, or deg as read
+  if (list.poses.size() < kFewestPoses) return {};
+  int turned = 0;
+  for (int j = 0; j < robot.size(); ++j) {
+    if (robot.joint(j).type != JointType::kRevolute) continue;
+    double largest = 0;
+    for (const CommandedPose& pose : list.poses) largest = std::max(largest, std::abs(to_deg(pose.context.q(j))));
+    if (largest > kMostRadians) return {};
+    turned += largest > kTurned ? 1 : 0;
+  }
+  if (turned < kFewestTurned) return {};
+  return refused("all joints of {} poses are within {:g} deg of zero", list.poses.size(), kMostRadians)
+      .in(list.where)
+      .of("q1_deg")
+      .next("are the joints radians? They must be degrees");
+}
+
+}  // namespace
+
 Result<JointList> check_against_cell(JointList list, const Cell& cell) {
   TRY(check_joint_columns(list.joint_types, cell.robot, list.where));
   for (CommandedPose& pose : list.poses) {
     const Status checked = check_pose(pose.context, cell);
     if (!checked) return Failure(checked.error()).in(list.where).at_row(pose.row);
   }
+  TRY(check_degrees(list, cell.robot));
   return list;
 }
 

@@ -31,7 +31,7 @@ struct JointList {
 [[nodiscard]] std::string to_csv(const JointList& list);
 
 /// Checks the list against `cell`, as batches are checked: number of joints, joint limits, tool and payload. Resolves
-/// tool and payload ids.
+/// tool and payload ids. Refuses joints that look like radians.
 [[nodiscard]] Result<JointList> check_against_cell(JointList list, const Cell& cell);
 
 }  // namespace trammel

@@ -5,23 +5,16 @@
 #include "server/base/units.h"
 #include "server/measurement/pose_columns.h"
 #include "server/measurement/reading/catalogue.h"
+#include "server/measurement/reading_units.h"
 
 namespace trammel::reading {
 
 namespace {
 
-constexpr double kMostRadians = 6.4;  // of a joint in radians, read as degrees: two half turns and a little
-constexpr double kGon = 0.9;          // deg
-constexpr double kInch = 25.4;        // mm
+constexpr double kGon = 0.9;  // deg
 constexpr std::array<const char*, 3> kAxes = {"x_mm", "y_mm", "z_mm"};
 constexpr const char* kAllAxes = "x_mm,y_mm,z_mm";
 
-/// Unit of a position that should have been mm.
-struct Unit {
-  const char* name;
-  double factor;
-};
-constexpr std::array<Unit, 4> kLengths = {Unit{"metres", 1000}, {"inches", kInch}, {"centimetres", 10}, {"um", 1e-3}};
 constexpr std::array<double, 3> kTurns = {90, -90, 180};
 
 Reading of_joints(std::string name, std::string columns, std::function<void(Eigen::MatrixXd&)> change) {
@@ -152,7 +145,7 @@ std::vector<Reading> position_readings(const NumberTable& table) {
   if (std::any_of(table.R_WT.begin(), table.R_WT.end(), [](const auto& R) { return R.has_value(); })) {
     for (const int axis : {1, 0, 2}) all.push_back(left_handed(axis));
   }
-  for (const Unit& unit : kLengths) {
+  for (const UnitOfLength& unit : kUnitsOfLength) {
     for (int k = 0; k < 3; ++k) {
       const std::string name = kAxes[static_cast<std::size_t>(k)];
       all.push_back(of_positions(fmt::format("with {} in {}", name, unit.name), name,

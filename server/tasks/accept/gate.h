@@ -29,7 +29,9 @@ enum class Bar {
 
 struct GateOptions {
   Bar bar = Bar::kBetter;
-  double accept_ratio = 1.02;  ///< rms over that of any model that has served, on the same judges, at the most
+  static constexpr double kUsualAcceptRatio = 1.02;
+  double accept_ratio =
+      kUsualAcceptRatio;  ///< rms over that of any model that has served, on the same judges, at the most
   static constexpr int kFewestJudges = 30;       ///< poses, in the joint ranges of the model in force
   static constexpr double kLeastCoverage = 0.5;  ///< of those ranges: by judges, and by a model trained anew
   static constexpr double kClaimedGain = 0.9;    ///< own uncertainty over that of the one in force, at the most

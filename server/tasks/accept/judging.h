@@ -11,6 +11,9 @@
 /// By which rows the models of a cell are judged, and what a model leaves of them.
 namespace trammel {
 
+/// Of the poses of a batch, where nobody says another share.
+inline constexpr double kUsualJudgingShare = 0.2;
+
 /// The rows (Measurement::row) of `batch` that judge models: `share` of its poses and, of 100 poses and more, at
 /// least 34; of fewer than 8 none. Drawn by the service with `seed` from the rows that the submitter does not hold out
 /// himself (`set`), so that he can hold out more but not choose who judges. Repeats of a pose are drawn together: a

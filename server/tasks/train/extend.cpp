@@ -4,7 +4,6 @@
 #include <set>
 
 #include "server/error_sources/catalogue.h"
-#include "server/tasks/accept/judging.h"
 #include "server/tasks/accept/verdict.h"
 #include "server/tasks/train/lasting_sources.h"
 
@@ -83,8 +82,7 @@ std::optional<DayGain> carry(const std::shared_ptr<const Cell>& cell, const std:
 Status check_can_extend(const Diagnosis& diagnosis) {
   if (diagnosis.sources_after != diagnosis.sources_before) return {};
   return refused("no cause was named that the model could be extended by ({}): {}", to_string(diagnosis.verdict),
-                 diagnosis.sentence)
-      .in("batch " + diagnosis.batch.id);
+                 diagnosis.sentence);
 }
 
 std::vector<std::string> added_sources(const std::vector<std::string>& own, const Diagnosis& diagnosis) {
@@ -101,7 +99,8 @@ std::vector<std::string> added_sources(const std::vector<std::string>& own, cons
 Result<ExtendedModel> extended_model(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& own,
                                      const CheckedBatch& batch, const Diagnosis& diagnosis,
                                      const TrainOptions& options) {
-  TRY(check_can_extend(diagnosis));
+  if (const Status allowed = check_can_extend(diagnosis); !allowed)
+    return Failure(allowed.error()).in("batch " + diagnosis.batch.id);
   if (batch.held_out().measurements.empty())
     return refused("no rows are held out to judge an extended model by")
         .in("batch " + batch.id())
@@ -144,13 +143,14 @@ Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const CheckedB
   Judges judges = judges_of(diagnosis, batch.held_out());
   PairedGain gain = paired_gain(before, after.model, judges.batch);
   gain.left_out = std::move(judges.left_out);
+  JudgingSession session{batch.id(), batch.training(), std::move(judges.batch)};
   const ServedModel present(cell->name, 0, before);
   GateVerdict verdict =
-      verdict_on(after.model, &present, {}, std::nullopt, {{batch.id(), batch.training(), std::move(judges.batch)}},
-                 {.bar = Bar::kBetterBeyondChance});
+      verdict_on(after.model, &present, {}, std::nullopt, {session}, {.bar = Bar::kBetterBeyondChance});
   std::vector<std::string> lasting = lasting_sources(after.sources);
-  return Extension{std::move(after.sources), std::move(lasting), std::move(before),         std::move(after.model),
-                   std::move(gain),          std::move(verdict), std::move(after.left_out), std::move(after.day)};
+  return Extension{std::move(after.sources), std::move(lasting),        std::move(before),
+                   std::move(after.model),   std::move(gain),           std::move(session),
+                   std::move(verdict),       std::move(after.left_out), std::move(after.day)};
 }
 
 Result<Applied> applied(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch, const Diagnosis& diagnosis,
@@ -162,24 +162,12 @@ Result<Applied> applied(const std::shared_ptr<const Cell>& cell, const CheckedBa
   });
 }
 
-Result<CompensatedModel> model_without(const std::shared_ptr<const Cell>& cell, const std::vector<std::string>& own,
-                                       const CheckedBatch& batch, const TrainOptions& options) {
-  return trained(cell, batch, own, options);
-}
-
 std::string Extension::why_not() const {
   if (day && !day->carries()) return to_string(*day);
   return verdict.put_in_force ? "" : verdict.why;
 }
 
-HoldOut held_out_to_extend(std::uint64_t seed) {
-  constexpr double kShare = 0.2;
-  return [seed](const MeasurementBatch& batch) {
-    const bool says = std::any_of(batch.measurements.begin(), batch.measurements.end(),
-                                  [](const Measurement& m) { return m.set != MeasurementSet::kUnassigned; });
-    return says ? drawn(kShare, seed)(batch) : held_out_by_service(kShare, seed)(batch);
-  };
-}
+HoldOut held_out_to_extend(std::uint64_t seed) { return held_out_by_service(kUsualJudgingShare, seed); }
 
 Error with_rows_set_aside(Error error, const CheckedBatch& batch) {
   const std::size_t aside = batch.held_out().measurements.size();

@@ -9,6 +9,7 @@
 #include "server/compensate/paired_gain.h"
 #include "server/diagnose/diagnosis.h"
 #include "server/tasks/accept/gate.h"
+#include "server/tasks/accept/judging.h"
 #include "server/tasks/train/another_day.h"
 #include "server/tasks/train/supported.h"
 #include "server/tasks/train/train.h"
@@ -16,7 +17,11 @@
 /// From what a diagnosis found to a model that has it: the one way, for files and for the service.
 namespace trammel {
 
-/// Whether the diagnosis found a cause that is accepted and unambiguous; else refuses, saying why not.
+/// The diagnosis' share of the progress where what it finds is applied; the rest is the training.
+inline constexpr double kDiagnosisShare = 0.6;
+
+/// Whether the diagnosis found a cause that is accepted and unambiguous; else refuses, saying why not. The batch is not
+/// named: each door has a name of its own for it.
 [[nodiscard]] Status check_can_extend(const Diagnosis& diagnosis);
 
 /// What the diagnosis adds to the list `own`.
@@ -51,7 +56,8 @@ struct Extension {
   std::vector<std::string> lasting;   ///< of them, those that belong into the cell file
   CompensatedModel before, after;     ///< both with figures on the same poses held out
   PairedGain gain;                    ///< of the one over the other
-  GateVerdict verdict;                ///< on the extended model, as a service judges it
+  JudgingSession judges;              ///< the rows that judge both
+  GateVerdict verdict;                ///< on the extended model by them, as a service judges it
   std::vector<Unsupported> left_out;  ///< found, but the poses held out do as well without
   std::optional<DayGain> day;         ///< what the causes are worth on another day; empty: too few rows to tell
 
@@ -59,9 +65,10 @@ struct Extension {
   /// Empty: apply it.
   [[nodiscard]] std::string why_not() const;
 };
-/// Holds out the rows with `set` where the batch has them; else what a service draws to judge by, a fifth.
+/// Holds out what a service with its usual share does: held_out_by_service().
 [[nodiscard]] HoldOut held_out_to_extend(std::uint64_t seed);
-/// extended_model() of the cell's own sources, beside a model of them alone. Refusals as there.
+/// extended_model() of the cell's own sources, beside a model of them alone: where no other model is in force, on files
+/// and in a service. Refusals as there.
 [[nodiscard]] Result<Extension> extend(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                        const Diagnosis& diagnosis, const TrainOptions& options);
 
@@ -73,11 +80,6 @@ struct Applied {
 /// extend(), where the diagnosis found something.
 [[nodiscard]] Result<Applied> applied(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                                       const Diagnosis& diagnosis, const TrainOptions& options);
-
-/// A model of the sources in `own` alone: what an extended one is held against where no other model is in force.
-[[nodiscard]] Result<CompensatedModel> model_without(const std::shared_ptr<const Cell>& cell,
-                                                     const std::vector<std::string>& own, const CheckedBatch& batch,
-                                                     const TrainOptions& options);
 
 /// `error` of diagnosing `batch`, and how many of its rows are set aside: they are not among those diagnosed.
 [[nodiscard]] Error with_rows_set_aside(Error error, const CheckedBatch& batch);

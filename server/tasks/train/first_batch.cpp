@@ -37,4 +37,11 @@ std::optional<Error> doubt_of_first_batch(const std::shared_ptr<const Cell>& cel
       .value();
 }
 
+Status check_first_batch(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+                         const std::optional<std::string>& level) {
+  std::optional<Error> doubt = doubt_of_first_batch(cell, batch, level);
+  if (!doubt) return {};
+  return Failure(std::move(*doubt)).in("batch " + batch.id());
+}
+
 }  // namespace trammel

@@ -17,5 +17,8 @@ namespace trammel {
 [[nodiscard]] std::optional<Error> doubt_of_first_batch(const std::shared_ptr<const Cell>& cell,
                                                         const CheckedBatch& batch,
                                                         const std::optional<std::string>& level = {});
+/// Refuses a batch with a doubt_of_first_batch().
+[[nodiscard]] Status check_first_batch(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
+                                       const std::optional<std::string>& level = {});
 
 }  // namespace trammel

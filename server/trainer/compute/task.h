@@ -35,8 +35,8 @@ struct ComputeTask {
   std::optional<ModelText> in_force;
   std::optional<FleetPrior> fleet;  ///< where the cell file says `prior: fleet`, and there are twins
   std::uint64_t seed = 1;
-  double validation_share = 0.2;
-  double accept_ratio = 1.02;
+  double validation_share = kUsualJudgingShare;
+  double accept_ratio = GateOptions::kUsualAcceptRatio;
   std::int64_t now = 0;  ///< Unix time, s: when the model is trained
 };
 

@@ -10,13 +10,12 @@
 #include "server/compensate/paired_gain.h"
 #include "server/diagnose/diagnose.h"
 #include "server/diagnose/triage.h"
-#include "server/health/health_check.h"
 #include "server/report/diagnosis_json.h"
 #include "server/report/diagnosis_page.h"
 #include "server/report/health_json.h"
-#include "server/robot/cell_rules.h"
 #include "server/tasks/accept/fits_cell.h"
 #include "server/tasks/accept/verdict.h"
+#include "server/tasks/check/check.h"
 #include "server/tasks/train/extend.h"
 #include "server/tasks/train/first_batch.h"
 #include "server/tasks/train/lasting_sources.h"
@@ -25,8 +24,6 @@
 namespace trammel {
 
 namespace {
-
-constexpr double kDiagnosisShare = 0.6;  // of a diagnosis that is applied; the rest is the training
 
 std::string findings_text(const Diagnosis& diagnosis) {
   return diagnosis_json(diagnosis).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
@@ -83,6 +80,21 @@ std::string joined_by_semicolons(const std::vector<std::string>& parts) {
     if (!part.empty()) text += "; " + part;
   }
   return text;
+}
+
+Made nothing_carried(const DayGain& day) {
+  Made made;
+  made.outcome.verdict = JobVerdict::kNothingApplied;
+  made.outcome.why = to_string(day);
+  made.message = "nothing applied: " + made.outcome.why;
+  return made;
+}
+
+/// What is said of an extended model beside its verdict. `judged_less`: pose ids that did not judge.
+std::string remarks_of(const std::vector<std::string>& judged_less, const std::vector<Unsupported>& left_out,
+                       const std::optional<DayGain>& day) {
+  return judged_without(judged_less) + joined_by_semicolons({to_string(left_out)}) +
+         (day ? joined_by_semicolons({to_string(*day)}) : "");
 }
 
 HoldOut hold_out_of(const ComputeTask& task) {
@@ -142,21 +154,18 @@ Result<Made> Workbench::checked(const ComputeWatch& watch) {
   const auto batch = TRY(batches_.first());
   const auto present = TRY(in_force());
   if (!present) return failure(ErrorCode::kNotFound, "the cell has no model in force to hold a check against");
-  const auto rules = TRY(rules_of(*task_.cell));
-  HealthOptions options;
-  options.tolerance = rules.tolerance.value_or(kUsualTolerance);
-  if (!task_.level.empty()) options.tolerance = std::stod(task_.level) * from_mm(1);
+  CheckAsked asked;
+  if (!task_.level.empty()) asked.tolerance = std::stod(task_.level) * from_mm(1);
   for (const std::string& earlier : task_.earlier_checks) {
-    if (auto drift = drift_of(earlier)) options.earlier.push_back(std::move(*drift));
+    if (auto drift = drift_of(earlier)) asked.earlier.push_back(std::move(*drift));
   }
-  const auto health = TRY(check_health(present->model, batch, options));
-  const auto& rows = batch.rows().measurements;
-  const auto json = health_json(health, {batch.id(), rows.empty() ? "" : rows.front().pose_id});
+  const HealthCheck check = TRY(check_robot(present->model, *task_.cell, batch, std::move(asked)));
+  const auto json = check_json(check, batch, present->model);
   TRY(watch.found(json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n", ""));
   Made made;
   made.outcome.verdict = JobVerdict::kDiagnosed;
-  made.outcome.why = health.sentence;
-  made.message = to_string(health.verdict);
+  made.outcome.why = check.sentence;
+  made.message = to_string(check.verdict);
   return made;
 }
 
@@ -222,25 +231,24 @@ Result<Made> Workbench::extended(const CheckedBatch& batch, const std::vector<st
   options.progress = [&watch](const std::string& stage, double share) {
     return watch.progress(stage, kDiagnosisShare + (1 - kDiagnosisShare) * share);
   };
+  if (!in_force_) return first_extended(batch, diagnosis, options);
   auto extended = TRY(extended_model(task_.cell, own, batch, diagnosis, options));
-  if (extended.day && !extended.day->carries()) {
-    Made made;
-    made.outcome.verdict = JobVerdict::kNothingApplied;
-    made.outcome.why = to_string(*extended.day);
-    made.message = "nothing applied: " + made.outcome.why;
-    return made;
-  }
-  if (!in_force_) {
-    auto without = TRY(model_without(task_.cell, own, batch, options));
-    without_ = std::make_shared<const ServedModel>(task_.cell->name, 0, std::move(without));
-  }
+  if (extended.day && !extended.day->carries()) return nothing_carried(*extended.day);
   auto found = TRY(batches_.sessions_of_diagnosis());
   MeasurementBatch& own_judges = found.sessions[found.own].judges;
   Judges judges = judges_of(diagnosis, std::move(own_judges));
   own_judges = std::move(judges.batch);
-  const std::string remarks = judged_without(judges.left_out) + joined_by_semicolons({to_string(extended.left_out)}) +
-                              (extended.day ? joined_by_semicolons({to_string(*extended.day)}) : "");
+  const std::string remarks = remarks_of(judges.left_out, extended.left_out, extended.day);
   return made(std::move(extended.model), remarks, std::move(found.sessions));
+}
+
+Result<Made> Workbench::first_extended(const CheckedBatch& batch, const Diagnosis& diagnosis,
+                                       const TrainOptions& options) {
+  Extension extension = TRY(extend(task_.cell, batch, diagnosis, options));
+  if (extension.day && !extension.day->carries()) return nothing_carried(*extension.day);
+  without_ = std::make_shared<const ServedModel>(task_.cell->name, 0, std::move(extension.before));
+  const std::string remarks = remarks_of(extension.gain.left_out, extension.left_out, extension.day);
+  return made(std::move(extension.after), remarks, {std::move(extension.judges)});
 }
 
 TrainOptions Workbench::train_options(const CheckedBatch& batch, const ComputeWatch& watch) const {
