@@ -1,6 +1,5 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 
 #include "clients/cli/commands/commands.h"
@@ -12,6 +11,7 @@
 #include "clients/cli/text/notes_text.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
+#include "server/base/unix_time.h"
 #include "server/bias/kernels/kernel_spelling.h"
 #include "server/calibrate/jump.h"
 #include "server/compensate/budget/error_budget.h"
@@ -36,10 +36,6 @@
 namespace trammel::cli {
 
 namespace {
-
-std::int64_t unix_time() {
-  return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
 
 /// Rows that were compared, with a position or without.
 int rows_of(const Evaluation& evaluation) {
@@ -154,7 +150,7 @@ Status train_model(const TrainArguments& arguments) {
   options.level = arguments.level;
   options.bias = arguments.bias;
   options.seed = arguments.seed;
-  options.trained_at = unix_time();
+  options.trained_at = unix_now();
   options.looked_at = arguments.as_read;
   std::optional<FleetPrior> fleet = TRY(fleet_prior(arguments.fleet, cell));
   options.fleet = std::move(fleet);
