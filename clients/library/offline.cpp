@@ -401,7 +401,7 @@ Result<std::string> diagnose(const Cell& cell, std::span<const Batch> batches, c
   how.progress = [&](const std::string& stage, double share) { return goes_on(options.progress, stage, share); };
   const auto found = trammel::diagnose(cell.inside().cell, *batch, how);
   if (!found) return tl::make_unexpected(to_api(with_rows_set_aside(found.error(), *batch)));
-  return diagnosis_json(*found).dump(2);
+  return diagnosis_json(*found, notes_of(*cell.inside().cell)).dump(2);
 }
 
 Result<Extension> extend(const Cell& cell, std::span<const Batch> batches, const DiagnoseOptions& options) {
@@ -425,7 +425,7 @@ Result<Extension> extend(const Cell& cell, std::span<const Batch> batches, const
   };
   auto extended = applied(of, *batch, *found, training);
   if (!extended) return passed_on(extended);
-  Extension told{diagnosis_json(*found).dump(2), {}, {}, extended->why_not};
+  Extension told{diagnosis_json(*found, notes_of(*of)).dump(2), {}, {}, extended->why_not};
   if (!told.why_not.empty()) return told;
   told.error_sources = std::move(extended->extension->lasting);
   told.model = Model(std::make_shared<const Model::Inside>(Model::Inside{std::move(extended->extension->after)}));

@@ -396,6 +396,13 @@ std::vector<Note> notes_of(const CompensatedModel& model) {
   return gravest_first(std::move(notes));
 }
 
+std::vector<Note> notes_of(const Cell& cell) {
+  std::vector<Note> notes;
+  add_cell_doubts(cell, notes);
+  add_confirmation(cell, notes);
+  return gravest_first(std::move(notes));
+}
+
 std::optional<Note> stop_of(const CompensatedModel& model) {
   std::vector<Note> notes = notes_of(model);
   if (notes.empty() || notes.front().severity != Severity::kStop) return std::nullopt;

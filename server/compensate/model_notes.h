@@ -27,6 +27,9 @@ constexpr const char* kOneSide = "approached_from_one_side";
 /// sessions.
 [[nodiscard]] std::vector<Note> notes_of(const CompensatedModel& model);
 
+/// What a user of any result should know that rests on the cell's files and on no model yet.
+[[nodiscard]] std::vector<Note> notes_of(const Cell& cell);
+
 /// The first note that keeps the model from being put in force by itself.
 [[nodiscard]] std::optional<Note> stop_of(const CompensatedModel& model);
 

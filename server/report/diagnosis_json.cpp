@@ -5,6 +5,7 @@
 #include "server/measurement/pose_columns.h"
 #include "server/report/budget_json.h"
 #include "server/report/figures_json.h"
+#include "server/report/note_json.h"
 #include "server/report/session_changes_json.h"
 
 namespace trammel {
@@ -167,7 +168,7 @@ ordered_json waterfall_json(const std::vector<WaterfallStep>& steps) {
 
 }  // namespace
 
-ordered_json diagnosis_json(const Diagnosis& diagnosis) {
+ordered_json diagnosis_json(const Diagnosis& diagnosis, const std::vector<Note>& notes) {
   return {{"verdict", to_string(diagnosis.verdict)},
           {"sentence", diagnosis.sentence},
           {"poses", diagnosis.poses},
@@ -193,6 +194,7 @@ ordered_json diagnosis_json(const Diagnosis& diagnosis) {
           {"leftover", leftover_json(diagnosis.leftover)},
           {"limits", diagnosis.limits},
           {"budget", diagnosis.budget ? budget_json(*diagnosis.budget) : ordered_json(nullptr)},
+          {"notes", notes_json(notes)},
           {"waterfall", waterfall_json(diagnosis.waterfall)},
           {"error_sources_before", diagnosis.sources_before},
           {"error_sources_after", diagnosis.sources_after},

@@ -1,6 +1,8 @@
 #include "server/report/fleet_json.h"
 
 #include "server/base/units.h"
+#include "server/compensate/model_notes.h"
+#include "server/report/note_json.h"
 #include "server/robot/cell_rules.h"
 
 namespace trammel {
@@ -70,6 +72,7 @@ ordered_json fleet_json(const std::vector<FleetEntry>& cells) {
       one["robot"] = robot.name();
       one["model"] = entry.model->provenance().id;
       one["unlike_twins"] = unlike_of(cells, i);
+      one["notes"] = notes_json(notes_of(*entry.model));
       const auto prior = learn_fleet_prior(robot, members_but(cells, cells.size()));
       if (prior && std::find(told.begin(), told.end(), robot.name()) == told.end()) {
         told.push_back(robot.name());

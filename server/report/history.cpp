@@ -6,6 +6,7 @@
 #include "server/base/units.h"
 #include "server/compensate/model_notes.h"
 #include "server/compensate/session_changes.h"
+#include "server/report/note_json.h"
 
 namespace trammel {
 
@@ -30,7 +31,8 @@ ordered_json version_json(const VersionOnRecord& one) {
   return {{"version", one.version},   {"model", one.id},
           {"batches", one.batches},   {"trained_at", one.trained_at},
           {"poses", one.poses},       {"validation_rms_mm", optional_mm(one.validation_rms)},
-          {"in_force", one.in_force}, {"parameters", std::move(parameters)}};
+          {"in_force", one.in_force}, {"parameters", std::move(parameters)},
+          {"notes", notes_json(one.notes)}};
 }
 
 ordered_json training_json(const TrainingOnRecord& one) {
@@ -57,8 +59,7 @@ ordered_json moved_json(const Moved& one) {
 
 void put_on_record(const CompensatedModel& model, VersionOnRecord& version) {
   const CompensatedModel::Parts& parts = model.parts();
-  version.notes.clear();
-  for (const Note& note : notes_of(model)) version.notes.push_back(note.text);
+  version.notes = notes_of(model);
   version.papers = papers_of(model.cell()).value_or(CellPapers());
   version.parameters.clear();
   std::size_t next = 0;

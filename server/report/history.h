@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "server/base/note.h"
 #include "server/compensate/compensated_model.h"
 #include "server/robot/cell_papers.h"
 
@@ -29,7 +30,7 @@ struct VersionOnRecord {
   std::optional<double> validation_rms = {};  ///< m
   bool in_force = false;
   std::vector<ParameterOnRecord> parameters = {};  ///< none where its file is not there any more
-  std::vector<std::string> notes = {};             ///< what it knows to have changed, and what its user should know
+  std::vector<Note> notes = {};                    ///< what it knows to have changed, and what its user should know
   CellPapers papers = {};                          ///< of its cell file
 };
 /// Its parameters, notes and papers, from the model itself.

@@ -185,7 +185,7 @@ std::string verdict(const CellHistory& history, const std::vector<Moved>& moved)
   std::string text = in_force_sentence(history);
   std::string list;
   if (now != nullptr)
-    for (const std::string& note : now->notes) list += "<li>" + html_text(note) + "</li>";
+    for (const Note& note : now->notes) list += "<li>" + html_text(note.text) + "</li>";
   for (const Moved& one : moved) {
     const Reading reading = reading_of(one.unit);
     const ShownValue step = show_read(one.to - one.from, one.u95, reading);

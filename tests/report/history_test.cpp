@@ -57,9 +57,11 @@ TEST(History, AVersionWhoseFileIsGoneLeavesAGapAndBreaksNothing) {
 TEST(History, ThePageShowsTrainingsEventsAndNotesAndWhatComesFromOutsideIsHarmless) {
   CellHistory history{"<b>cell</b>", {version(1, zero_of_joint_3(1e-3, 1e-6))}};
   history.versions[0].in_force = true;
-  history.versions[0].notes = {"since session lt-02 (pose p1): lost zero in joint 3"};
+  history.versions[0].notes = {
+      {"changed_between_sessions", Note::Severity::kInfo, "since session lt-02 (pose p1): lost zero in joint 3"}};
   history.trainings = {{1'700'000'000, "lt-01", "in_force", "better beyond chance", 0.5e-3, 0.02e-3}};
   history.events = {{1'700'000'000, "activate", "version 1", "<script>alert(1)</script>", "cam-2"}};
+  EXPECT_EQ(history_json(history)["versions"][0]["notes"][0]["code"], "changed_between_sessions");
   const std::string page = history_page(history);
   for (const char* part : {"0.5000", "0.0200", "in force: better beyond chance", "lost zero in joint 3", "activate",
                            "&lt;b&gt;cell&lt;/b&gt;", "&lt;script&gt;", "2023-11-14 22:13"})

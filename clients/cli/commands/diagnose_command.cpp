@@ -7,12 +7,15 @@
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/diagnose_text.h"
+#include "clients/cli/text/notes_text.h"
 #include "server/base/plain_text.h"
 #include "server/base/unix_time.h"
 #include "server/compensate/model_file.h"
+#include "server/compensate/model_notes.h"
 #include "server/diagnose/diagnose.h"
 #include "server/report/diagnosis_json.h"
 #include "server/report/diagnosis_page.h"
+#include "server/report/note_json.h"
 #include "server/report/pages_beside.h"
 #include "server/robot/cell_sources_file.h"
 
@@ -77,6 +80,7 @@ Result<Applied> apply(const std::shared_ptr<const Cell>& cell, const CheckedBatc
   if (!found || !found->extension) return found;
   const Extension& extension = *found->extension;
   json["applied"] = extension_json(extension);
+  json["notes"] = notes_json(notes_of(extension.after));
   say(extension_text(extension), arguments);
   if (!found->why_not.empty()) {
     found->why_not = fmt::format("cell {}: {}", cell->name, found->why_not);
@@ -117,7 +121,9 @@ Result<Extent> diagnose_files(const DiagnoseArguments& arguments) {
   const CheckedBatch batch = TRY(batch_to_diagnose(arguments, *cell));
   const Result<Diagnosis> diagnosis = run_diagnosis(cell, batch, arguments.seed);
   if (!diagnosis) return tl::make_unexpected(with_rows_set_aside(diagnosis.error(), batch));
-  ordered_json json = diagnosis_json(*diagnosis);
+  const std::vector<Note> notes = notes_of(*cell);
+  warn_of_notes(notes);
+  ordered_json json = diagnosis_json(*diagnosis, notes);
   say(diagnosis_text(json), arguments);
   std::optional<Result<Applied>> applied;
   if (arguments.apply) applied = apply(cell, batch, *diagnosis, arguments, json, outputs);

@@ -7,6 +7,7 @@
 #include "clients/cli/service/answers.h"
 #include "clients/cli/service/model_answers.h"
 #include "clients/cli/terminal/output.h"
+#include "clients/cli/text/notes_text.h"
 #include "clients/cli/text/prediction_text.h"
 #include "clients/cli/work/in_parallel.h"
 #include "server/base/plain_text.h"
@@ -93,6 +94,7 @@ Result<Extent> predict_program(const PredictProgramArguments& arguments) {
   const cam::Program program = TRY(understood_program(files, reading, arguments.frames));
   const cam::PredictedProgram predicted =
       TRY(arguments.service.service ? predict_by_service(program, arguments) : predict_here(program, arguments));
+  warn_of_notes(predicted.model.notes);
   TRY(write_output(arguments.output, prediction_csv(predicted)));
   fmt::print(stderr, "{}", shown_lines(prediction_summary(predicted)));
   if (!arguments.json.empty()) {

@@ -3,11 +3,14 @@
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/terminal/options.h"
 #include "clients/cli/terminal/output.h"
+#include "clients/cli/text/notes_text.h"
 #include "server/compensate/budget/error_budget.h"
 #include "server/compensate/budget/remedies.h"
 #include "server/compensate/model_file.h"
+#include "server/compensate/model_notes.h"
 #include "server/measurement/files/joint_list.h"
 #include "server/report/budget_json.h"
+#include "server/report/note_json.h"
 #include "server/report/pages_beside.h"
 #include "server/report/remedies_page.h"
 
@@ -50,7 +53,8 @@ nlohmann::ordered_json remedies_json(const CompensatedModel& model, const ErrorB
           {"controller",
            {{"maker", words.maker}, {"zeros", words.zeros}, {"lengths", words.lengths}, {"load", words.load}}},
           {"steps", remedy_steps_json(budget)},
-          {"budget", budget_json(budget)}};
+          {"budget", budget_json(budget)},
+          {"notes", notes_json(notes_of(model))}};
 }
 
 Status remedies(const RemediesArguments& arguments) {
@@ -61,6 +65,7 @@ Status remedies(const RemediesArguments& arguments) {
                                 : fmt::format("{} targets of {}", budget.poses, arguments.targets);
   std::string text = fmt::format("{}, model {}, {}:\n", model.cell().robot.name(), model.provenance().id, where);
   for (const std::string& line : remedies_in_words(budget, model.cell().robot)) text += line + "\n";
+  warn_of_notes(notes_of(model));
   tell(text, {arguments.output, arguments.json});
   if (!arguments.output.empty()) {
     const std::string page = with_pages_beside(remedies_page(model, budget, where), arguments.output);

@@ -15,6 +15,7 @@
 #include "clients/cli/text/service_text.h"
 #include "server/base/text_file.h"
 #include "server/compensate/model_file.h"
+#include "server/compensate/model_notes.h"
 #include "server/measurement/files/batch_file.h"
 #include "server/report/cell_health.h"
 #include "server/report/note_json.h"
@@ -41,13 +42,19 @@ Extent extent_of(const client::JobStatus& job) {
   return job.model_version == 0 || put_in_force(job) ? Extent::kAll : Extent::kPart;
 }
 
+/// What a user of a version should know; 0: of the one in force. Nothing where the service does not say.
+Result<std::vector<Note>> notes_of_version(client::Session& session, const std::string& cell, int version) {
+  const std::vector<client::ModelInfo> models = TRY(session.models(cell));
+  const auto asked = std::find_if(models.begin(), models.end(), [&](const client::ModelInfo& model) {
+    return version == 0 ? model.in_force : model.version == version;
+  });
+  return asked == models.end() ? std::vector<Note>() : asked->notes;
+}
+
 /// What a user of the model should know that the job put in force.
 Result<std::vector<Note>> notes_of_made(client::Session& session, const client::JobStatus& job) {
   if (!put_in_force(job)) return std::vector<Note>();
-  const std::vector<client::ModelInfo> models = TRY(session.models(job.cell));
-  const auto made = std::find_if(models.begin(), models.end(),
-                                 [&](const client::ModelInfo& model) { return model.version == job.model_version; });
-  return made == models.end() ? std::vector<Note>() : made->notes;
+  return notes_of_version(session, job.cell, job.model_version);
 }
 
 /// Follows a job to its end; a failed one is an error.
@@ -243,7 +250,11 @@ ordered_json in_force_at(client::Session& session, const std::string& cell) {
 }
 
 Status now_in_force(client::Session& session, const std::string& cell, int version, const ServiceArguments& arguments) {
-  const ordered_json now = in_force_json(cell, version, in_force_at(session, cell));
+  ordered_json now = in_force_json(cell, version, in_force_at(session, cell));
+  // The change is made: what cannot be asked afterwards is no failure of it.
+  const std::vector<Note> notes = notes_of_version(session, cell, version).value_or(std::vector<Note>());
+  now["notes"] = notes_json(notes);
+  warn_of_notes(notes);
   tell(in_force_text(now), {arguments.json});
   return write_json(arguments.json, now);
 }
@@ -278,20 +289,32 @@ Status show_model(client::Session& session, const ServiceArguments& arguments) {
   return write_json(arguments.json, model_json(model));
 }
 
+/// What a user of a model should know that a service hands out or has taken; nothing of one that only the service reads.
+std::vector<Note> notes_of_file(const std::string& text) {
+  const auto model = deserialize(text, "the model");
+  return model ? notes_of(*model) : std::vector<Note>();
+}
+
 Status export_model(client::Session& session, const ServiceArguments& arguments) {
   const ModelReference model = TRY(parse_model_reference(arguments.model));
   const std::string text = TRY(session.export_model(model.cell, model.version));
   TRY(write_output(arguments.output, text));
+  const std::vector<Note> notes = notes_of_file(text);
+  warn_of_notes(notes);
   tell(fmt::format("model of cell {} in {}\n", model.cell, arguments.output), {arguments.output, arguments.json});
-  return write_json(arguments.json, {{"cell", model.cell}, {"file", arguments.output}, {"bytes", text.size()}});
+  return write_json(
+      arguments.json,
+      {{"cell", model.cell}, {"file", arguments.output}, {"bytes", text.size()}, {"notes", notes_json(notes)}});
 }
 
 Status import_model(client::Session& session, const ServiceArguments& arguments) {
   const std::string cell = TRY(cell_id(arguments.cell));
   const std::string text = TRY(read_text_file(arguments.model));
   const int version = TRY(session.import_model(cell, text));
+  const std::vector<Note> notes = notes_of_file(text);
+  warn_of_notes(notes);
   tell(fmt::format("cell {}: the model is version {}\n", cell, version), {arguments.json});
-  return write_json(arguments.json, {{"cell", cell}, {"version", version}});
+  return write_json(arguments.json, {{"cell", cell}, {"version", version}, {"notes", notes_json(notes)}});
 }
 
 /// Adds commands that talk to a service.

@@ -6,6 +6,7 @@
 
 #include "server/base/units.h"
 #include "server/measurement/files/csv_table.h"
+#include "server/report/note_json.h"
 
 namespace trammel::cli {
 
@@ -73,7 +74,9 @@ ordered_json prediction_json(const PredictedProgram& program) {
     }
     targets.push_back(std::move(item));
   }
-  return {{"model", program.model_id}, {"notes", program.notes}, {"targets", targets}};
+  std::vector<Note> notes = program.model.notes;
+  for (const std::string& one : program.notes) notes.push_back({"program", Note::Severity::kInfo, one});
+  return {{"model", program.model_id}, {"notes", notes_json(notes)}, {"targets", targets}};
 }
 
 std::string prediction_summary(const PredictedProgram& program) {

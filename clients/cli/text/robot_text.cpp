@@ -6,7 +6,9 @@
 
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
+#include "server/compensate/model_notes.h"
 #include "server/measurement/files/csv_table.h"
+#include "server/report/note_json.h"
 
 namespace trammel::cli {
 
@@ -251,7 +253,8 @@ nlohmann::ordered_json robot_json(const CompensatedModel& model, const RigidRobo
         {{"source", one.source}, {"what", one.plain}, {"rms_mm", to_mm(one.rms)}, {"max_mm", to_mm(one.most)}});
   }
   return {{"cell", model.cell().name},   {"model", model.provenance().id},      {"poses", robot.poses},
-          {"left_out", std::move(left)}, {"left_out_rms_mm", to_mm(robot.rms)}, {"left_out_max_mm", to_mm(robot.most)}};
+          {"left_out", std::move(left)}, {"left_out_rms_mm", to_mm(robot.rms)}, {"left_out_max_mm", to_mm(robot.most)},
+          {"notes", notes_json(notes_of(model))}};
 }
 
 }  // namespace trammel::cli

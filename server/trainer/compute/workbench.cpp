@@ -25,8 +25,8 @@ namespace trammel {
 
 namespace {
 
-std::string findings_text(const Diagnosis& diagnosis) {
-  return diagnosis_json(diagnosis).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+std::string findings_text(const Diagnosis& diagnosis, const Cell& cell) {
+  return diagnosis_json(diagnosis, notes_of(cell)).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 /// The cell as it is served: with the error sources of the model in force.
@@ -209,7 +209,7 @@ Result<Made> Workbench::diagnosed(const ComputeWatch& watch) {
   const auto served = as_served(task_.cell, present.get(), batch);
   const auto diagnosis = trammel::diagnose(served, batch, options);
   if (!diagnosis) return tl::make_unexpected(with_rows_set_aside(diagnosis.error(), batch));
-  TRY(watch.found(findings_text(*diagnosis), diagnosis_page(*diagnosis, *served)));
+  TRY(watch.found(findings_text(*diagnosis, *served), diagnosis_page(*diagnosis, *served)));
   Made made;
   made.outcome.verdict = JobVerdict::kDiagnosed;
   made.outcome.why = diagnosis->sentence;
