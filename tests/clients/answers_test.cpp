@@ -119,23 +119,25 @@ TEST(Answers, PredictionsAreWrittenWithTheirPinnedColumnsFirst) {
   item.predicted = {1, 2, 3, 1, 0, 0, 0};
   item.dx_mm = .5;
   item.sx_mm = .25;
+  item.slx_mm = .125;
   item.in_domain = true;
   EXPECT_EQ(predictions_csv(list, {"abc", {item}}),
-            "dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,x_mm,y_mm,z_mm,qw,qx,qy,qz,pose_id,model_id\n"
-            "0.5,0,0,0.25,0,0,1,1,2,3,1,0,0,0,\"p, 1\",abc\n");
+            "dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,x_mm,y_mm,z_mm,qw,qx,qy,qz,pose_id,model_id,slx_mm,sly_mm,slz_mm\n"
+            "0.5,0,0,0.25,0,0,1,1,2,3,1,0,0,0,\"p, 1\",abc,0.125,0,0\n");
+  EXPECT_EQ(predictions_json(list, {"abc", {item}})["predictions"][0]["slx_mm"], .125);
   EXPECT_EQ(predictions_json(list, {"abc", {item}})["predictions"][0]["dx_mm"], .5);
 }
 
-TEST(Answers, CovariancesAndTheTrueErrorsStddevAreAppendedWhereAskedFor) {
+TEST(Answers, CovariancesAreAppendedWhereAskedForAndTheTrueErrorsStddevAlways) {
   ErrorPrediction prediction;
   prediction.covariance_B << 4e-8, 1e-8, -2e-8, 1e-8, 9e-8, 3e-8, -2e-8, 3e-8, 16e-8;
   prediction.true_stddev_B = Vector3(1e-4, 2e-4, 3e-4);
   JointList list;
   list.poses.push_back(CommandedPose{});
-  const Predictions with{"abc", {client::PredictedError{}}, {joint_uncertainty(to_wire(prediction))}};
+  const Predictions with{"abc", {to_wire(prediction)}, {joint_uncertainty(to_wire(prediction))}};
   const CsvTable table = CsvTable::parse(predictions_csv(list, with), "p.csv").value();
   const std::string without = predictions_csv(list, {"abc", {client::PredictedError{}}});
-  EXPECT_EQ(without.find("cxy_mm2"), std::string::npos) << "the pinned columns stand alone unless more is asked for";
+  EXPECT_EQ(without.find("cxy_mm2"), std::string::npos);
   const auto number = [&](const char* column) { return std::stod(table.field(0, table.require(column).value())); };
   EXPECT_NEAR(number("cxy_mm2"), 0.01, 1e-12);
   EXPECT_NEAR(number("cxz_mm2"), -0.02, 1e-12);

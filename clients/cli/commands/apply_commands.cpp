@@ -353,12 +353,10 @@ void add_predict(CLI::App& app, Action& chosen) {
       ->required();
   command->add_flag(
       "--covariance", arguments->covariance,
-      "Append the covariances of the coordinates of one measurement (cxy_mm2 ...) and the standard deviations of the "
-      "true error, the tracker's noise left out (slx_mm ...); with a model file only");
+      "Append the covariances of the coordinates of one measurement (cxy_mm2 ...)");
   command->add_flag(
       "--orientation", arguments->orientation,
-      "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...); with a model "
-      "file only");
+      "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...)");
   add_reading_options(*command, arguments->format, arguments->frames, arguments->idle_axes, arguments->task,
                       arguments->pulses_per_deg);
   add_apply_options(*command, *arguments)->required();

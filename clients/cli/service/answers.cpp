@@ -145,7 +145,7 @@ JointVector from_wire(const std::vector<double>& wire, const Chain& robot) {
 }
 
 JointUncertainty joint_uncertainty(const client::PredictedError& item) {
-  return {item.cxy_mm2, item.cxz_mm2, item.cyz_mm2, item.slx_mm, item.sly_mm, item.slz_mm};
+  return {item.cxy_mm2, item.cxz_mm2, item.cyz_mm2};
 }
 
 Result<RotationUncertainty> rotation_uncertainty(const client::PredictedError& item) {
@@ -155,8 +155,9 @@ Result<RotationUncertainty> rotation_uncertainty(const client::PredictedError& i
 }
 
 std::string predictions_csv(const JointList& list, const Predictions& predictions) {
-  std::string text = fmt::format("dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,{},pose_id,model_id", kPoseColumns);
-  if (!predictions.together.empty()) text += ",cxy_mm2,cxz_mm2,cyz_mm2,slx_mm,sly_mm,slz_mm";
+  std::string text = fmt::format("dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,{},pose_id,model_id,slx_mm,sly_mm,slz_mm",
+                                 kPoseColumns);
+  if (!predictions.together.empty()) text += ",cxy_mm2,cxz_mm2,cyz_mm2";
   if (!predictions.turned.empty()) text += ",srx_deg,sry_deg,srz_deg";
   text += "\n";
   for (std::size_t i = 0; i < predictions.items.size(); ++i) {
@@ -166,10 +167,10 @@ std::string predictions_csv(const JointList& list, const Predictions& prediction
     }
     text += fmt::format("{},{},{},{}", item.in_domain ? 1 : 0, pose_fields(item.predicted),
                         csv_field(list.poses[i].pose_id), predictions.model_id);
+    for (const double value : {item.slx_mm, item.sly_mm, item.slz_mm}) text += fmt::format(",{:.9g}", value);
     if (!predictions.together.empty()) {
       const JointUncertainty& u = predictions.together[i];
-      for (const double value : {u.cxy_mm2, u.cxz_mm2, u.cyz_mm2, u.slx_mm, u.sly_mm, u.slz_mm})
-        text += fmt::format(",{:.9g}", value);
+      for (const double value : {u.cxy_mm2, u.cxz_mm2, u.cyz_mm2}) text += fmt::format(",{:.9g}", value);
     }
     if (!predictions.turned.empty()) {
       const RotationUncertainty& u = predictions.turned[i];
@@ -191,6 +192,9 @@ ordered_json predictions_json(const JointList& list, const Predictions& predicti
                      {"sx_mm", item.sx_mm},
                      {"sy_mm", item.sy_mm},
                      {"sz_mm", item.sz_mm},
+                     {"slx_mm", item.slx_mm},
+                     {"sly_mm", item.sly_mm},
+                     {"slz_mm", item.slz_mm},
                      {"in_domain", item.in_domain},
                      {"nominal", pose_json(item.nominal)},
                      {"predicted", pose_json(item.predicted)}});
@@ -200,12 +204,7 @@ ordered_json predictions_json(const JointList& list, const Predictions& predicti
     }
     if (predictions.together.empty()) continue;
     const JointUncertainty& u = predictions.together[i];
-    items.back().update({{"cxy_mm2", u.cxy_mm2},
-                         {"cxz_mm2", u.cxz_mm2},
-                         {"cyz_mm2", u.cyz_mm2},
-                         {"slx_mm", u.slx_mm},
-                         {"sly_mm", u.sly_mm},
-                         {"slz_mm", u.slz_mm}});
+    items.back().update({{"cxy_mm2", u.cxy_mm2}, {"cxz_mm2", u.cxz_mm2}, {"cyz_mm2", u.cyz_mm2}});
   }
   return {{"model", predictions.model_id}, {"notes", notes_json(predictions.notes)}, {"predictions", items}};
 }

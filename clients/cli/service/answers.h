@@ -26,10 +26,9 @@ namespace trammel::cli {
 /// How the arm comes to a pose, as far as that is known.
 [[nodiscard]] client::Approach approach_of(const PoseContext& context);
 
-/// How the coordinates of a prediction's uncertainty hang together, and how much of it is the true error's.
+/// How the coordinates of a prediction's uncertainty hang together.
 struct JointUncertainty {
   double cxy_mm2 = 0, cxz_mm2 = 0, cyz_mm2 = 0;  ///< covariances of one measurement's coordinates
-  double slx_mm = 0, sly_mm = 0, slz_mm = 0;     ///< stddev of the true error: without the tracker's own sigma
 };
 [[nodiscard]] JointUncertainty joint_uncertainty(const client::PredictedError& prediction);
 
