@@ -1,6 +1,9 @@
 #include "server/report/health_json.h"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include "server/base/units.h"
 #include "server/compensate/model_notes.h"
@@ -42,25 +45,58 @@ ordered_json change_json(const SeenChange& change, const CheckedSince& since) {
   return json;
 }
 
-ordered_json change_line(const std::string& line, const std::string& kind, const std::string& name) {
-  return {{"line", line},
-          {"kind", kind},
+/// What a budget calls a line.
+struct LineName {
+  std::string line, kind;
+  int joint = -1;  ///< 0-based
+};
+
+/// `zero:4`, `length:6`, `twist:2`, `compliance:3`; else the cause, and its joint where it has one.
+LineName line_of(const SingleCause& cause) {
+  const CauseRecord& record = *cause.record;
+  const std::size_t digits = cause.parameter.find_first_of("0123456789");
+  if (record.part == causes::Part::kLinks && digits != std::string::npos) {
+    const std::string letters = cause.parameter.substr(0, digits), number = cause.parameter.substr(digits);
+    const int joint = std::stoi(number) - 1;
+    if (letters == "q") return {"zero:" + number, "joint_zero", joint};
+    const std::string word = letters == "d" || letters == "a" ? "length" : "twist";
+    return {word + ":" + number, word, joint};
+  }
+  const std::string spelling(record.spelling);
+  if (cause.joint < 0) return {spelling, spelling};
+  const std::string of_joint = ":" + std::to_string(cause.joint + 1);
+  if (record.search == causes::SearchFamily::kZeroStep && !cause.any_function)
+    return {"zero" + of_joint, "joint_zero", cause.joint};
+  const bool is_gearbox = record.gives_way && record.numbers == causes::Numbers::kOneAJoint;
+  return {spelling + of_joint, is_gearbox ? "joint_compliance" : spelling, cause.joint};
+}
+
+/// A line of a budget as far as a check knows it: what it has no number for is null.
+ordered_json change_line(const LineName& line, const std::string& name) {
+  return {{"line", line.line},
+          {"kind", line.kind},
           {"name", name},
-          {"joint", nullptr},
+          {"joint", line.joint >= 0 ? ordered_json(line.joint + 1) : ordered_json(nullptr)},
           {"value", nullptr},
           {"u95", nullptr},
           {"unit", nullptr},
           {"alone_rms_mm", nullptr},
+          {"alone_max_mm", nullptr},
+          {"share", nullptr},
+          {"left_if_right_mm", nullptr},
+          {"times_usual", nullptr},
           {"with", ordered_json::array()},
           {"action", ""}};
 }
 
+/// Lines with the m rms that they are put in order by.
+using SizedLines = std::vector<std::pair<double, ordered_json>>;
+
 /// A line for each zero; what each of several does alone is not known.
-void add_zero_lines(const SeenChange& change, ordered_json& lines) {
+void add_zero_lines(const SeenChange& change, SizedLines& lines) {
   for (const LostZero& zero : change.zeros) {
     const std::string n = std::to_string(zero.joint + 1);
-    ordered_json line = change_line("zero:" + n, "joint_zero", "the zero of joint " + n);
-    line["joint"] = zero.joint + 1;
+    ordered_json line = change_line({"zero:" + n, "joint_zero", zero.joint}, "the zero of joint " + n);
     line["value"] = to_deg(zero.by);
     line["u95"] = to_deg(zero.u95);
     line["unit"] = "deg";
@@ -68,37 +104,40 @@ void add_zero_lines(const SeenChange& change, ordered_json& lines) {
     for (const LostZero& other : change.zeros)
       if (other.joint != zero.joint) line["with"].push_back("zero:" + std::to_string(other.joint + 1));
     line["action"] = "re-master joint " + n;
-    lines.push_back(std::move(line));
+    lines.emplace_back(change.effect_rms, std::move(line));
   }
 }
 
-ordered_json change_line(const SeenChange& change) {
-  const int joint = change.cause.joint;
-  const std::string cause(change.cause.record->spelling);
-  ordered_json line =
-      change_line(joint >= 0 ? cause + ":" + std::to_string(joint + 1) : cause, cause, in_words(change.cause));
-  if (joint >= 0) line["joint"] = joint + 1;
+void add_line(const SeenChange& change, SizedLines& lines) {
+  ordered_json line = change_line(line_of(change.cause), in_words(change.cause));
   line["alone_rms_mm"] = to_mm(change.effect_rms);
-  for (const SingleCause& other : change.could_also_be) line["with"].push_back(in_words(other));
+  for (const SingleCause& other : change.could_also_be) line["with"].push_back(line_of(other).line);
   line["action"] = change.cause.record->action;
-  return line;
+  lines.emplace_back(change.effect_rms, std::move(line));
 }
 
 /// What changed since the model was made, in the shape of a budget: from what is off now to what a healthy robot
-/// leaves.
+/// leaves. A check finds the base anew, so that all of it is beyond the base's frame.
 ordered_json change_budget_json(const HealthCheck& check) {
-  ordered_json lines = ordered_json::array();
+  SizedLines sized;
   for (const SeenChange& change : check.changed) {
     if (change.zeros.empty()) {
-      lines.push_back(change_line(change));
+      add_line(change, sized);
     } else {
-      add_zero_lines(change, lines);
+      add_zero_lines(change, sized);
     }
   }
-  ordered_json rest = change_line("rest", "rest", "what a healthy robot leaves");
+  ordered_json rest = change_line({"rest", "rest"}, "what a healthy robot leaves");
   rest["alone_rms_mm"] = to_mm(check.expected_rms);
-  lines.push_back(std::move(rest));
-  return {{"nominal_rms_mm", to_mm(check.rms)}, {"poses", check.poses}, {"lines", std::move(lines)}};
+  sized.emplace_back(check.expected_rms, std::move(rest));
+  std::stable_sort(sized.begin(), sized.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  ordered_json lines = ordered_json::array();
+  for (auto& [size, line] : sized) lines.push_back(std::move(line));
+  ordered_json beyond_frames = {{"nominal_rms_mm", to_mm(check.rms)}, {"lines", lines}};
+  return {{"nominal_rms_mm", to_mm(check.rms)},
+          {"poses", check.poses},
+          {"lines", std::move(lines)},
+          {"beyond_frames", std::move(beyond_frames)}};
 }
 
 constexpr double kMonth = 30 * 86400.0;  // s

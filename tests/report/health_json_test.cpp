@@ -1,0 +1,56 @@
+#include "server/report/health_json.h"
+
+#include <gtest/gtest.h>
+
+#include "server/error_sources/catalogue.h"
+
+namespace trammel {
+namespace {
+
+constexpr double kDegree = 0.017453292519943295;
+
+HealthCheck made_up_check() {
+  HealthCheck check;
+  check.verdict = HealthVerdict::kChanged;
+  check.poses = 12;
+  check.rms = 0.9e-3;
+  check.expected_rms = 0.03e-3;
+  SeenChange length;
+  length.cause = {&cause_spelled("geometry"), -1, "d6"};
+  length.effect_rms = 0.2e-3;
+  length.could_also_be = {{&cause_spelled("compliance"), 2, "C3"}, {&cause_spelled("gear_transmission"), 0}};
+  SeenChange zero;
+  zero.cause = {&cause_spelled("joint_slip"), 3};
+  zero.effect_rms = 0.8e-3;
+  zero.zeros = {{3, 0.1 * kDegree, 0.002 * kDegree}};
+  check.changed = {length, zero};
+  return check;
+}
+
+TEST(HealthJson, TellsWhatChangedInTheLinesOfABudgetTheLargestFirst) {
+  const auto budget = health_json(made_up_check(), {}).at("budget");
+  EXPECT_DOUBLE_EQ(budget.at("nominal_rms_mm"), 0.9);
+  const auto& lines = budget.at("lines");
+  ASSERT_EQ(lines.size(), 3u);
+  EXPECT_EQ(lines[0].at("line"), "zero:4");
+  EXPECT_EQ(lines[0].at("kind"), "joint_zero");
+  EXPECT_EQ(lines[0].at("joint"), 4);
+  EXPECT_NEAR(lines[0].at("value"), 0.1, 1e-12);
+  EXPECT_EQ(lines[0].at("unit"), "deg");
+  EXPECT_DOUBLE_EQ(lines[0].at("alone_rms_mm"), 0.8);
+  EXPECT_EQ(lines[1].at("line"), "length:6");
+  EXPECT_EQ(lines[1].at("kind"), "length");
+  EXPECT_EQ(lines[1].at("joint"), 6);
+  EXPECT_EQ(lines[1].at("with"), (std::vector<std::string>{"compliance:3", "gear_transmission:1"}));
+  EXPECT_EQ(lines[2].at("line"), "rest");
+  EXPECT_EQ(budget.at("beyond_frames").at("lines"), lines);
+  for (const auto& line : lines) {
+    for (const char* key : {"line", "kind", "joint", "value", "u95", "unit", "alone_rms_mm", "alone_max_mm", "share",
+                            "left_if_right_mm", "times_usual", "with", "action"}) {
+      EXPECT_TRUE(line.contains(key)) << key;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace trammel
