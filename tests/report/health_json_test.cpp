@@ -41,7 +41,8 @@ TEST(HealthJson, TellsWhatChangedInTheLinesOfABudgetTheLargestFirst) {
   EXPECT_EQ(lines[1].at("line"), "length:6");
   EXPECT_EQ(lines[1].at("kind"), "length");
   EXPECT_EQ(lines[1].at("joint"), 6);
-  EXPECT_EQ(lines[1].at("with"), (std::vector<std::string>{"compliance:3", "gear_transmission:1"}));
+  EXPECT_EQ(lines[1].at("with").get<std::vector<std::string>>(),
+            (std::vector<std::string>{"compliance:3", "gear_transmission:1"}));
   EXPECT_EQ(lines[2].at("line"), "rest");
   EXPECT_EQ(budget.at("beyond_frames").at("lines"), lines);
   for (const auto& line : lines) {

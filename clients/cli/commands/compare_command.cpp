@@ -1,6 +1,8 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <tuple>
 
 #include "clients/cli/commands/commands.h"
 #include "clients/cli/files/batch_files.h"
@@ -8,15 +10,16 @@
 #include "clients/cli/terminal/output.h"
 #include "clients/cli/text/evaluation_text.h"
 #include "clients/cli/text/notes_text.h"
-#include "server/base/shown_value.h"
 #include "server/base/units.h"
 #include "server/compensate/budget/between.h"
 #include "server/compensate/budget/budget_words.h"
+#include "server/compensate/known_rows.h"
 #include "server/compensate/model_file.h"
 #include "server/compensate/model_notes.h"
 #include "server/compensate/paired_gain.h"
 #include "server/compensate/world.h"
 #include "server/measurement/gauges.h"
+#include "server/measurement/pose_columns.h"
 #include "server/plan/plan.h"
 #include "server/report/budget_json.h"
 #include "server/report/comparison_page.h"
@@ -48,6 +51,7 @@ struct Compared {
   std::string where;  ///< which poses, for people
   ModelDifference difference;
   std::optional<Judged> judged;
+  std::size_t learned = 0;  ///< poses of the batch that one of the models was trained on: they do not judge
 };
 
 /// Poses of the cell that both models know: a Latin hypercube, with a tool and a payload of the newer model.
@@ -64,30 +68,38 @@ Result<std::vector<PoseContext>> drawn_poses(const CompensatedModel& model) {
   return poses;
 }
 
-Result<Judged> judge(const CompensatedModel& before, const CompensatedModel& now, const MeasurementBatch& batch) {
-  const InWorld by_old = TRY(in_world_of(before, batch));
-  const InWorld by_new = TRY(in_world_of(now, batch));
-  return Judged{before.evaluate(by_old.batch), now.evaluate(by_new.batch),
-                paired_gain(before.errors_B(positions_of(by_old.batch)).compensated,
-                            now.errors_B(positions_of(by_new.batch)).compensated)};
+Status judge(const CompensatedModel& before, const CompensatedModel& now, const CheckedBatch& batch, Compared& all) {
+  const LearnedFrom by_before(before, batch.hash()), by_now(now, batch.hash());
+  const auto is_learned = [&](const Measurement& m) { return by_before(m) || by_now(m); };
+  MeasurementBatch in_old = TRY(in_world_of(before, positions_of(batch.rows()))).batch;
+  MeasurementBatch in_new = TRY(in_world_of(now, positions_of(batch.rows()))).batch;
+  all.learned = std::erase_if(in_old.measurements, is_learned);
+  std::erase_if(in_new.measurements, is_learned);
+  if (in_old.measurements.empty()) return {};
+  all.judged = Judged{before.evaluate(in_old), now.evaluate(in_new),
+                      paired_gain(before.errors_B(in_old).compensated, now.errors_B(in_new).compensated)};
+  return {};
 }
 
 Result<Compared> compared(const CompensatedModel& before, const CompensatedModel& now, const CompareArguments& asked) {
   TRY(check_fits_cell(before, now.cell(), "model " + before.provenance().id));
   Compared all;
+  std::optional<CheckedBatch> batch;
   if (asked.batch.empty()) {
     all.poses = TRY(drawn_poses(now));
     all.where = fmt::format("{} poses drawn over the cell", all.poses.size());
   } else {
-    const CheckedBatch batch = TRY(read_checked_batches({asked.batch}, now.cell()));
-    TRY(require_positions(batch.rows(), "compare --batch"));
-    for (const Measurement& m : positions_of(batch.rows()).measurements) all.poses.push_back(m.context);
-    all.where = fmt::format("{} poses of {}", all.poses.size(), batch.id());
-    all.judged = TRY(judge(before, now, batch.rows()));
+    batch.emplace(TRY(read_checked_batches({asked.batch}, now.cell())));
+    TRY(require_positions(batch->rows(), "compare --batch"));
+    for (const Measurement& m : positions_of(batch->rows()).measurements) all.poses.push_back(m.context);
+    all.where = fmt::format("{} poses of {}", all.poses.size(), batch->id());
   }
   for (const PoseContext& pose : all.poses) {
     TRY(before.check_trained_with(pose.tool, pose.payload));
     TRY(now.check_trained_with(pose.tool, pose.payload));
+  }
+  if (batch) {
+    TRY(judge(before, now, *batch, all));
   }
   all.difference = difference_between(before, now, all.poses);
   return all;
@@ -118,6 +130,9 @@ std::string text_of(const Compared& all, const CompensatedModel& before, const C
       now.provenance().id, before.provenance().id, to_mm(rms_of(found)),
       to_mm(found.moved_B[most_moved(found).front()].norm()), all.where, to_mm(found.budget.beyond_frames.error_rms));
   for (const std::string& line : difference_in_words(found)) text += line + "\n";
+  if (all.learned > 0)
+    text += fmt::format("note: {} of the {} poses do not judge the models, because one was trained on them\n", all.learned,
+                        all.poses.size());
   if (all.judged)
     text += fmt::format("on these poses: {}\nmodel {}:\n{}model {}:\n{}", to_string(all.judged->gain),
                         before.provenance().id, evaluation_table(all.judged->before), now.provenance().id,
@@ -135,13 +150,15 @@ ordered_json model_of(const CompensatedModel& model) {
           {"notes", notes_json(notes_of(model))}};
 }
 
-ordered_json poses_json(const Compared& all) {
+ordered_json poses_json(const Compared& all, const std::vector<JointType>& types) {
   ordered_json poses = ordered_json::array();
   for (const std::size_t i : most_moved(all.difference)) {
-    std::vector<double> joints;
-    for (const double q : all.poses[i].q) joints.push_back(q);
-    const Vector3 moved = 1e3 * all.difference.moved_B[i];
-    poses.push_back({{"pose", i + 1}, {"joints_si", joints}, {"moved_mm", {moved.x(), moved.y(), moved.z()}}});
+    ordered_json joints = ordered_json::object();
+    for (std::size_t j = 0; j < types.size(); ++j)
+      joints[joint_column(static_cast<int>(j), types[j])] =
+          joint_to_column(all.poses[i].q(static_cast<Eigen::Index>(j)), types[j]);
+    const Vector3 moved = to_mm(1) * all.difference.moved_B[i];
+    poses.push_back({{"pose", i + 1}, {"joints", std::move(joints)}, {"moved_mm", {moved.x(), moved.y(), moved.z()}}});
   }
   return poses;
 }
@@ -166,13 +183,14 @@ ordered_json comparison_json(const Compared& all, const CompensatedModel& before
                        {"max_mm", to_mm(found.moved_B[most_moved(found).front()].norm())},
                        {"parameters", std::move(parameters)},
                        {"budget", std::move(budget)},
-                       {"most_moved", poses_json(all)},
+                       {"most_moved", poses_json(all, joint_types(now.cell().robot))},
                        {"notes", notes_json(notes_of(now))}};
   if (all.judged)
     json["batch"] = {{"a", evaluation_json(all.judged->before)},
                      {"b", evaluation_json(all.judged->now)},
                      {"gain_z", all.judged->gain.z()},
                      {"b_is_better", all.judged->gain.beyond_chance()}};
+  if (all.learned > 0) json["trained_on"] = all.learned;
   return json;
 }
 

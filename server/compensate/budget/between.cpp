@@ -29,10 +29,16 @@ std::vector<Eigen::Index> places_in(const PhysicalModel& all, const PhysicalMode
   return places;
 }
 
+/// `sign`: 1 of the newer model, -1 of the older one.
 void add(const ModelParts& parts, double sign, CalibrationResult& between) {
   const std::vector<Eigen::Index> places = places_in(between.model, parts.physics);
+  const std::vector<Parameter> parameters = parts.physics.parameters();
   for (std::size_t i = 0; i < places.size(); ++i) {
-    between.model.values(places[i]) += sign * parts.physics.values(static_cast<Eigen::Index>(i));
+    double& value = between.model.values(places[i]);
+    const double own = parts.physics.values(static_cast<Eigen::Index>(i));
+    // The order of a ripple says where it is: a difference of two ripples has the order of the newer one.
+    if (!parameters[i].is_place) value += sign * own;
+    if (parameters[i].is_place && value == 0) value = own;
     for (std::size_t k = 0; k < places.size(); ++k)
       between.covariance(places[i], places[k]) +=
           parts.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
