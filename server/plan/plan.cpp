@@ -152,12 +152,14 @@ Status check_count(const PlanOptions& options) {
 struct Planning {
   std::shared_ptr<const Cell> cell;
   std::vector<std::string> tools, payloads;
-  bool twice = false;  // each pose from above and from below
+  bool twice = false;    // each pose from above and from below
+  bool one_way = false;  // each pose from below
 
   /// How the pose with this number is approached.
   [[nodiscard]] std::vector<Sides> ways(const JointVector& q, std::size_t number) const {
     const auto joints = static_cast<std::size_t>(q.size());
     if (twice) return {Sides(joints, -1), Sides(joints, 1)};
+    if (one_way) return {Sides(joints, 1)};
     return {possible_sides(cell->robot, q, planned_sides(cell->robot, static_cast<int>(number)))};
   }
 };
@@ -350,9 +352,11 @@ Result<Plan> make_plan(const std::shared_ptr<const Cell>& cell, const PlanOption
   if (options.criterion == PlanCriterion::kCheck && options.bidirectional) {
     return failure(ErrorCode::kUsage, "a check takes each pose once").of("--bidirectional");
   }
+  if (options.one_way && options.bidirectional)
+    return failure(ErrorCode::kUsage, "each pose from both sides, and one way").of("--one-way");
   const auto tools = TRY(resolved(*cell, options.tools, resolve_tool));
   const auto payloads = TRY(resolved(*cell, options.payloads, resolve_payload));
-  const Planning planning{cell, tools, payloads, options.bidirectional};
+  const Planning planning{cell, tools, payloads, options.bidirectional, options.one_way};
   const Filter filter = TRY(Filter::of(*cell, planning.tools));
   const auto drawn = [&](int wanted, int largest_factor) {
     return draw(

@@ -43,6 +43,7 @@ struct PlanOptions {
   bool orientation = true;              ///< false: positions only will be measured
   std::vector<std::string> tools = {};  ///< to measure with in turn; empty: the cell's only one
   std::vector<std::string> payloads = {};
+  bool one_way = false;  ///< all joints come to each pose from below: play in the gears does not show, and costs no way
 };
 
 /// `count` poses of the cell (rows, rad): a Latin hypercube, of which the poses inside the workspace and in sight of

@@ -140,6 +140,19 @@ TEST(Approach, ABidirectionalPlanHasEveryPoseTwice) {
   }
 }
 
+TEST(Approach, OneWayComesFromBelowAlways) {
+  const auto cell = test::cell_7();
+  PlanOptions options{40, 7};
+  options.one_way = true;
+  for (const PlannedPose& pose : make_plan(cell, options).value().poses)
+    EXPECT_EQ(pose.context.direction, Sides(6, 1)) << pose.id;
+  options.criterion = PlanCriterion::kObservability;
+  for (const PlannedPose& pose : make_plan(cell, options).value().poses)
+    EXPECT_EQ(pose.context.direction, Sides(6, 1)) << pose.id;
+  options.bidirectional = true;
+  EXPECT_EQ(make_plan(cell, options).error().code, ErrorCode::kUsage);
+}
+
 TEST(Approach, TheArmStaysInTheWorkspaceOnTheWay) {
   Cell cell = *test::cell_7();
   cell.workspace = Workspace{{0, -1.4, 0.8}, {2, 1.4, 3.2}};

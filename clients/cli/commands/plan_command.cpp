@@ -279,9 +279,16 @@ void add_plan_command(CLI::App& app, Action& chosen) {
           "parameters of the cell's error sources become certain; separate:CAUSE,CAUSE, to tell the first cause "
           "from the second")
       ->capture_default_str();
-  command->add_flag("--bidirectional", options.bidirectional,
-                    "Every pose twice, once with all joints from above and once from below (else once, each joint from "
-                    "above at one half of the poses and from below at the other)");
+  CLI::Option* twice = command->add_flag(
+      "--bidirectional", options.bidirectional,
+      "Every pose twice, once with all joints from above and once from below (else once, each joint from "
+      "above at one half of the poses and from below at the other)");
+  command
+      ->add_flag("--one-way", options.one_way,
+                 "Every pose once, all joints from below: a model of such poses promises nothing of poses that are "
+                 "approached from above")
+      ->excludes(twice)
+      ->excludes("--from");
   command->add_flag("--positions-only", arguments->positions_only,
                     "Choose for a single reflector, which shows no orientations");
   command
