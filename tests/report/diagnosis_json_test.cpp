@@ -10,7 +10,7 @@ namespace {
 TEST(DiagnosisJson, HasTheKeysThatProgramsAreToldOf) {
   const auto json = diagnosis_json(test::made_up_diagnosis(test::cell_7()));
   for (const char* key : {"verdict", "poses", "noise_mm", "before", "after", "held_out", "findings", "unexplained",
-                          "not_separable", "could_not_have_seen", "suspect_poses", "next_poses"}) {
+                          "not_separable", "could_not_have_seen", "suspect_poses", "next_poses", "budget", "notes"}) {
     EXPECT_TRUE(json.contains(key)) << key;
   }
   for (const char* key : {"cause", "joint", "parameters", "effect_rms_mm", "held_out_gain_mm", "strength", "p_value",
@@ -20,6 +20,14 @@ TEST(DiagnosisJson, HasTheKeysThatProgramsAreToldOf) {
   EXPECT_EQ(json["verdict"], "ambiguous");
   EXPECT_TRUE(json["held_out"]["before"].contains("rms_mm"));
   EXPECT_TRUE(json["unexplained"]["present"].get<bool>());
+}
+
+TEST(DiagnosisJson, HasTheNotesOfItsCellAsObjects) {
+  const auto note = diagnosis_json(test::made_up_diagnosis(test::cell_7()),
+                                   {{"robot_not_confirmed", Note::Severity::kWarning, "nobody compared it"}})["notes"][0];
+  EXPECT_EQ(note["code"], "robot_not_confirmed");
+  EXPECT_EQ(note["severity"], "warning");
+  EXPECT_EQ(note["text"], "nobody compared it");
 }
 
 TEST(DiagnosisJson, CountsJointsFromOneAndSpeaksInMillimetresAndDegrees) {
