@@ -28,10 +28,14 @@ ordered_json parameter_json(const ParameterOnRecord& one) {
 ordered_json version_json(const VersionOnRecord& one) {
   ordered_json parameters = ordered_json::array();
   for (const ParameterOnRecord& parameter : one.parameters) parameters.push_back(parameter_json(parameter));
-  return {{"version", one.version},   {"model", one.id},
-          {"batches", one.batches},   {"trained_at", one.trained_at},
-          {"poses", one.poses},       {"validation_rms_mm", optional_mm(one.validation_rms)},
-          {"in_force", one.in_force}, {"parameters", std::move(parameters)},
+  return {{"version", one.version},
+          {"model", one.id},
+          {"batches", one.batches},
+          {"trained_at", one.trained_at},
+          {"poses", one.poses},
+          {"validation_rms_mm", optional_mm(one.validation_rms)},
+          {"in_force", one.in_force},
+          {"parameters", std::move(parameters)},
           {"notes", notes_json(one.notes)}};
 }
 

@@ -121,9 +121,10 @@ TEST(Answers, PredictionsAreWrittenWithTheirPinnedColumnsFirst) {
   item.sx_mm = .25;
   item.slx_mm = .125;
   item.in_domain = true;
-  EXPECT_EQ(predictions_csv(list, {"abc", {item}}),
-            "dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,x_mm,y_mm,z_mm,qw,qx,qy,qz,pose_id,model_id,slx_mm,sly_mm,slz_mm\n"
-            "0.5,0,0,0.25,0,0,1,1,2,3,1,0,0,0,\"p, 1\",abc,0.125,0,0\n");
+  EXPECT_EQ(
+      predictions_csv(list, {"abc", {item}}),
+      "dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,x_mm,y_mm,z_mm,qw,qx,qy,qz,pose_id,model_id,slx_mm,sly_mm,slz_mm\n"
+      "0.5,0,0,0.25,0,0,1,1,2,3,1,0,0,0,\"p, 1\",abc,0.125,0,0\n");
   EXPECT_EQ(predictions_json(list, {"abc", {item}})["predictions"][0]["slx_mm"], .125);
   EXPECT_EQ(predictions_json(list, {"abc", {item}})["predictions"][0]["dx_mm"], .5);
 }

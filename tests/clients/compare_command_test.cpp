@@ -38,22 +38,27 @@ class Compare : public testing::Test {
   static void SetUpTestSuite() {
     folder_ = std::make_unique<test::TemporaryFolder>();
     const std::string shipped = TRAMMEL_SOURCE_DIR "/models/truth/chapter-5.yaml";
-    const std::string changed = folder_->write("changed.yaml", replaced(text_of(shipped), "q4_rad: -2.6e-4", "q4_rad: 5e-3"));
+    const std::string changed =
+        folder_->write("changed.yaml", replaced(text_of(shipped), "q4_rad: -2.6e-4", "q4_rad: 5e-3"));
     const std::string cell = TRAMMEL_SOURCE_DIR "/config/cell-7.yaml";
     make("before", cell, shipped, 1);
     make("now", cell, changed, 2);
     measure("fresh", cell, changed, 3);
     folder_->write("longer.yaml",
                    replaced(text_of(TRAMMEL_SOURCE_DIR "/models/abb_irb6640-205-275.yaml"), "d_mm: 780", "d_mm: 790"));
-    make("other", folder_->write("other-cell.yaml", replaced(text_of(cell), "../models/abb_irb6640-205-275.yaml", "longer.yaml")),
-         shipped, 4);
+    make(
+        "other",
+        folder_->write("other-cell.yaml", replaced(text_of(cell), "../models/abb_irb6640-205-275.yaml", "longer.yaml")),
+        shipped, 4);
   }
   static void TearDownTestSuite() { folder_.reset(); }
 
   static std::string file(const std::string& name) { return folder_->file(name); }
   static json json_in(const std::string& name) { return json::parse(text_of(file(name))); }
   static void measure(const std::string& name, const std::string& cell, const std::string& truth, int seed) {
-    ASSERT_EQ(trammel({"plan", "--cell", cell, "--count", "60", "--seed", std::to_string(seed), "-o", file(name + "-plan.csv")}), 0);
+    ASSERT_EQ(trammel({"plan", "--cell", cell, "--count", "60", "--seed", std::to_string(seed), "-o",
+                       file(name + "-plan.csv")}),
+              0);
     ASSERT_EQ(trammel({"simulate", "--cell", cell, "--truth", truth, "--plan", file(name + "-plan.csv"), "--seed",
                        std::to_string(seed), "-o", file(name + ".csv")}),
               0);
@@ -69,7 +74,9 @@ class Compare : public testing::Test {
 };
 
 TEST_F(Compare, LeadsWithTheZeroThatChanged) {
-  ASSERT_EQ(trammel({"compare", file("before.model"), file("now.model"), "--json", file("c.json"), "--report", file("c.html")}), 0);
+  ASSERT_EQ(trammel({"compare", file("before.model"), file("now.model"), "--json", file("c.json"), "--report",
+                     file("c.html")}),
+            0);
   const json told = json_in("c.json");
   EXPECT_EQ(told.at("a").at("cell"), "cell-7");
   EXPECT_EQ(told.at("b").at("batch"), "now");
@@ -96,7 +103,9 @@ TEST_F(Compare, LeadsWithTheZeroThatChanged) {
 }
 
 TEST_F(Compare, MeasurementsSayWhichModelTheRobotIsLike) {
-  ASSERT_EQ(trammel({"compare", file("before.model"), file("now.model"), "--batch", file("fresh.csv"), "--json", file("c.json")}), 0);
+  ASSERT_EQ(trammel({"compare", file("before.model"), file("now.model"), "--batch", file("fresh.csv"), "--json",
+                     file("c.json")}),
+            0);
   const json told = json_in("c.json");
   EXPECT_EQ(told.at("poses"), 60);
   EXPECT_TRUE(told.at("batch").at("b_is_better").get<bool>());
@@ -106,7 +115,9 @@ TEST_F(Compare, MeasurementsSayWhichModelTheRobotIsLike) {
 }
 
 TEST_F(Compare, APoseThatOneOfThemWasTrainedOnJudgesNeither) {
-  ASSERT_EQ(trammel({"compare", file("before.model"), file("now.model"), "--batch", file("now.csv"), "--json", file("c.json")}), 0);
+  ASSERT_EQ(trammel({"compare", file("before.model"), file("now.model"), "--batch", file("now.csv"), "--json",
+                     file("c.json")}),
+            0);
   const json told = json_in("c.json");
   EXPECT_EQ(told.at("trained_on"), 60);
   EXPECT_FALSE(told.contains("batch"));

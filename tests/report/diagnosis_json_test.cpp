@@ -23,8 +23,9 @@ TEST(DiagnosisJson, HasTheKeysThatProgramsAreToldOf) {
 }
 
 TEST(DiagnosisJson, HasTheNotesOfItsCellAsObjects) {
-  const auto note = diagnosis_json(test::made_up_diagnosis(test::cell_7()),
-                                   {{"robot_not_confirmed", Note::Severity::kWarning, "nobody compared it"}})["notes"][0];
+  const auto note =
+      diagnosis_json(test::made_up_diagnosis(test::cell_7()),
+                     {{"robot_not_confirmed", Note::Severity::kWarning, "nobody compared it"}})["notes"][0];
   EXPECT_EQ(note["code"], "robot_not_confirmed");
   EXPECT_EQ(note["severity"], "warning");
   EXPECT_EQ(note["text"], "nobody compared it");

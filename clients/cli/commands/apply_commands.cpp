@@ -351,12 +351,10 @@ void add_predict(CLI::App& app, Action& chosen) {
                    "Predicted errors, standard deviations and poses to write, in the robot's base (CSV: mm); of a "
                    "program a line for each of its targets")
       ->required();
-  command->add_flag(
-      "--covariance", arguments->covariance,
-      "Append the covariances of the coordinates of one measurement (cxy_mm2 ...)");
-  command->add_flag(
-      "--orientation", arguments->orientation,
-      "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...)");
+  command->add_flag("--covariance", arguments->covariance,
+                    "Append the covariances of the coordinates of one measurement (cxy_mm2 ...)");
+  command->add_flag("--orientation", arguments->orientation,
+                    "Append the standard deviations of one measured orientation about the base's axes (srx_deg ...)");
   add_reading_options(*command, arguments->format, arguments->frames, arguments->idle_axes, arguments->task,
                       arguments->pulses_per_deg);
   add_apply_options(*command, *arguments)->required();

@@ -131,8 +131,8 @@ std::string text_of(const Compared& all, const CompensatedModel& before, const C
       to_mm(found.moved_B[most_moved(found).front()].norm()), all.where, to_mm(found.budget.beyond_frames.error_rms));
   for (const std::string& line : difference_in_words(found)) text += line + "\n";
   if (all.learned > 0)
-    text += fmt::format("note: {} of the {} poses do not judge the models, because one was trained on them\n", all.learned,
-                        all.poses.size());
+    text += fmt::format("note: {} of the {} poses do not judge the models, because one was trained on them\n",
+                        all.learned, all.poses.size());
   if (all.judged)
     text += fmt::format("on these poses: {}\nmodel {}:\n{}model {}:\n{}", to_string(all.judged->gain),
                         before.provenance().id, evaluation_table(all.judged->before), now.provenance().id,

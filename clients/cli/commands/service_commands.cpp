@@ -289,7 +289,8 @@ Status show_model(client::Session& session, const ServiceArguments& arguments) {
   return write_json(arguments.json, model_json(model));
 }
 
-/// What a user of a model should know that a service hands out or has taken; nothing of one that only the service reads.
+/// What a user of a model should know that a service hands out or has taken; nothing of one that only the service
+/// reads.
 std::vector<Note> notes_of_file(const std::string& text) {
   const auto model = deserialize(text, "the model");
   return model ? notes_of(*model) : std::vector<Note>();

@@ -155,8 +155,8 @@ Result<RotationUncertainty> rotation_uncertainty(const client::PredictedError& i
 }
 
 std::string predictions_csv(const JointList& list, const Predictions& predictions) {
-  std::string text = fmt::format("dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,{},pose_id,model_id,slx_mm,sly_mm,slz_mm",
-                                 kPoseColumns);
+  std::string text = fmt::format(
+      "dx_mm,dy_mm,dz_mm,sx_mm,sy_mm,sz_mm,in_domain,{},pose_id,model_id,slx_mm,sly_mm,slz_mm", kPoseColumns);
   if (!predictions.together.empty()) text += ",cxy_mm2,cxz_mm2,cyz_mm2";
   if (!predictions.turned.empty()) text += ",srx_deg,sry_deg,srz_deg";
   text += "\n";

@@ -252,8 +252,12 @@ nlohmann::ordered_json robot_json(const CompensatedModel& model, const RigidRobo
     left.push_back(
         {{"source", one.source}, {"what", one.plain}, {"rms_mm", to_mm(one.rms)}, {"max_mm", to_mm(one.most)}});
   }
-  return {{"cell", model.cell().name},   {"model", model.provenance().id},      {"poses", robot.poses},
-          {"left_out", std::move(left)}, {"left_out_rms_mm", to_mm(robot.rms)}, {"left_out_max_mm", to_mm(robot.most)},
+  return {{"cell", model.cell().name},
+          {"model", model.provenance().id},
+          {"poses", robot.poses},
+          {"left_out", std::move(left)},
+          {"left_out_rms_mm", to_mm(robot.rms)},
+          {"left_out_max_mm", to_mm(robot.most)},
           {"notes", notes_json(notes_of(model))}};
 }
 

@@ -26,7 +26,9 @@ namespace trammel {
 namespace {
 
 std::string findings_text(const Diagnosis& diagnosis, const Cell& cell) {
-  return diagnosis_json(diagnosis, notes_of(cell)).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return diagnosis_json(diagnosis, notes_of(cell))
+             .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+         "\n";
 }
 
 /// The cell as it is served: with the error sources of the model in force.
