@@ -134,6 +134,19 @@ TEST(ServiceText, WhatIsNotInForceComesWithTheNextCommand) {
   EXPECT_EQ(next_step(failed), "next: measure more poses");
 }
 
+TEST(ServiceText, ServersOfARecordThatDoNotAnswerClientsAreListedBesideThoseThatDo) {
+  auto servers = nlohmann::ordered_json::parse(R"([{"server": "a", "serves": true, "trains": true, "reachable": true}])");
+  add_other_servers(nlohmann::ordered_json::parse(R"([{"server": "a", "serves": true, "trains": true, "gone": false},
+      {"server": "b", "serves": false, "trains": true, "gone": false},
+      {"server": "c", "serves": true, "trains": false, "gone": true}, {"server": 7}, 3])"),
+                    servers);
+  ASSERT_EQ(servers.size(), 3u);
+  EXPECT_EQ(servers[1].dump(), R"({"server":"b","serves":false,"trains":true,"reachable":true})");
+  EXPECT_EQ(servers[2].dump(), R"({"server":"c","serves":true,"trains":false,"reachable":false})");
+  add_other_servers(nullptr, servers);
+  EXPECT_EQ(servers.size(), 3u);
+}
+
 TEST(ServiceText, TheServersOfARecordAreThereBehindOrGone) {
   using nlohmann::ordered_json;
   const ordered_json record = {{"kind", "postgresql"}, {"place", "postgresql://db/trammel"}, {"reachable", true}};

@@ -150,6 +150,7 @@ Status status(client::Session& session, const ServiceArguments& arguments) {
   }
   const ordered_json record = record_of(answers);
   const ordered_json fleet = fleet_of(answers);
+  add_other_servers(fleet, list);
   text += record_text(record) + servers_text(fleet, record);
   tell(text + models_text(models) + checked + jobs_text(jobs) + quarantine_text(apart), {arguments.json});
   return write_json(arguments.json, {{"record", record},

@@ -209,6 +209,20 @@ std::string part_text(const ordered_json& server) {
 
 }  // namespace
 
+void add_other_servers(const ordered_json& of_record, ordered_json& servers) {
+  if (!of_record.is_array()) return;
+  for (const ordered_json& one : of_record) {
+    const std::string name = word_in(one, "server");
+    const bool answers = std::any_of(servers.begin(), servers.end(),
+                                     [&](const ordered_json& known) { return word_in(known, "server") == name; });
+    if (answers || name.empty()) continue;
+    servers.push_back({{"server", name},
+                       {"serves", says_yes(one, "serves")},
+                       {"trains", says_yes(one, "trains")},
+                       {"reachable", !says_yes(one, "gone")}});
+  }
+}
+
 std::string record_text(const ordered_json& record) {
   if (word_in(record, "kind") != "postgresql") return "";
   const std::string place = word_in(record, "place");
