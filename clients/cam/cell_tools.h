@@ -3,6 +3,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,7 @@ struct CellTools {
   /// Refuses a tool and payload that the model has not learned with; empty: it knows all.
   std::function<Status(const std::string& tool, const std::string& payload)> check_known = {};
   std::optional<Vector3> gravity_B = {};  ///< unit vector, seen from the robot's base; empty: not known
+  std::set<std::string> idle_axes = {};   ///< that carry neither robot nor part, by axis_called()
 };
 
 struct ToolChoice {

@@ -98,6 +98,7 @@ class Finding {
     for (const int axis : program_.moved_axes) {
       if (axis >= rails) moving_axes_.insert(axis);
     }
+    std::erase_if(moving_axes_, [&](int axis) { return cell_.idle_axes.contains(axis_called(program_, axis)); });
   }
 
   /// Where a motion leaves the arm.

@@ -298,6 +298,20 @@ void read_surroundings(const YamlMap& map, Cell& cell) {
   });
 }
 
+/// An axis that carries the robot is one of its joints, so that there is one thing to say of the others.
+std::vector<std::string> read_idle_axes(const YamlMap& axes) {
+  std::vector<std::string> names = axes.keys();
+  for (const std::string& name : names) {
+    axes.attempt([&] {
+      const std::string carries = axes.text(name);
+      if (carries != "carries nothing")
+        axes.refuse(name, refused("'{}', expected carries nothing; a rail that carries the robot is a joint of it", carries)
+                              .with_text(carries));
+    });
+  }
+  return names;
+}
+
 CellRules read_rules(const YamlMap& map) {
   CellRules rules;
   map.attempt([&] {
@@ -314,6 +328,9 @@ CellRules read_rules(const YamlMap& map) {
     rules.fleet_prior = prior == "fleet";
   });
   map.attempt([&] { rules.controller_compensates = map.boolean("controller_compensates", false); });
+  map.attempt([&] {
+    if (!map.is_null("axes")) rules.idle_axes = read_idle_axes(map.map("axes"));
+  });
   return rules;
 }
 
@@ -349,7 +366,7 @@ Cell read_cell_map(const YamlMap& map) {
             "prior",          "controller_compensates",
             "anchors",        "serial_number",
             "instrument",     "operator",
-            "robot_confirmed"});
+            "robot_confirmed", "axes"});
   Cell cell;
   map.attempt([&] {
     if (map.integer("version", 0) != 1)

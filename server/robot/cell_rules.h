@@ -1,6 +1,8 @@
 #pragma once
 
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "server/base/result.h"
 #include "server/robot/cell.h"
@@ -12,6 +14,8 @@ struct CellRules {
   std::optional<double> tolerance;      ///< m: what the cell must hold, 95 % of its positions
   bool fleet_prior = false;             ///< robots of its type that were trained before say what to expect of it
   bool controller_compensates = false;  ///< the controller corrects errors of its own; batches were measured so
+  /// External axes that carry neither robot nor part, by the names that programs have for them.
+  std::vector<std::string> idle_axes = {};
 };
 /// As the cell file says; nothing is demanded of a cell without one.
 [[nodiscard]] Result<CellRules> rules_of(const Cell& cell);

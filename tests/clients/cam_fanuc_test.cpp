@@ -273,6 +273,17 @@ TEST(Fanuc, AnAxisThatMovesIsNamedByGroupAndNumberUnlessItIsSaidToCarryNothing) 
   for (const ProgramTarget& target : program.targets) EXPECT_TRUE(target.external.empty());
 }
 
+TEST(Fanuc, ACellMaySayThatAnAxisCarriesNothing) {
+  ReadOptions read;
+  read.frames.emplace("UFRAME[1]", make_pose(Matrix3::Identity(), {1.5, 0, .5}));
+  read.frames.emplace("UTOOL[2]", test::spindle_only().tools.at("spindle"));
+  CellTools cell = test::spindle_only();
+  cell.idle_axes = {"gun", "group 2, axis 1"};  // one that no program here has says nothing of it
+  const test::Corrected made = corrected_by_shift(Dialect::kFanuc, {{"p1.ls", with_gun()}}, read, {}, cell);
+  EXPECT_EQ(made.refusal, "");
+  EXPECT_EQ(made.program.left_alone(), 0u) << why(made, "P[1]");
+}
+
 TEST(Fanuc, APointThatNoMotionGoesToIsANoteAndNothingThatIsLeft) {
   const test::Corrected made = ls(program("   2:L P[1] 100mm/sec FINE ;\n", position(1, kXyz) + position(2, kXyz)));
   EXPECT_EQ(made.program.left_alone(), 0u);

@@ -8,6 +8,7 @@
 #include "server/base/units.h"
 #include "server/robot/cell.h"
 #include "server/robot/cell_papers.h"
+#include "server/robot/cell_rules.h"
 #include "tests/support/refusal.h"
 #include "tests/support/temporary_folder.h"
 
@@ -38,6 +39,18 @@ TEST(CellFile, EveryShippedRobotAndCellLoads) {
     const Result<Cell> cell = read_cell(shipped(file));
     EXPECT_TRUE(cell) << (cell ? "" : cell.error().message);
   }
+}
+
+TEST(CellFile, NamesExternalAxesThatCarryNothing) {
+  const std::string text = *read_text_file(shipped("config/cell-7.yaml"));
+  const std::string robot = *read_text_file(shipped("models/abb_irb6640-205-275.yaml"));
+  const Result<Cell> cell = parse_cell(text + "axes: {gun: carries nothing, 'group 2, axis 1': carries nothing}\n", robot, "c.yaml");
+  ASSERT_TRUE(cell) << cell.error().message;
+  EXPECT_EQ(rules_of(*cell)->idle_axes, (std::vector<std::string>{"gun", "group 2, axis 1"}));
+  const Result<Cell> carries = parse_cell(text + "axes: {rail: carries the robot}\n", robot, "c.yaml");
+  ASSERT_FALSE(carries);
+  EXPECT_NE(sentence(carries.error()).find("'carries the robot', expected carries nothing"), std::string::npos)
+      << sentence(carries.error());
 }
 
 TEST(CellFile, ABiasMayBeSpelledAsASum) {

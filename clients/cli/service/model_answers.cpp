@@ -1,6 +1,7 @@
 #include "clients/cli/service/model_answers.h"
 
 #include "server/compensate/model_notes.h"
+#include "server/robot/cell_rules.h"
 
 namespace trammel::cli {
 
@@ -10,6 +11,7 @@ cam::CellTools tools_of(const CompensatedModel& model) {
     TRY(known_tool_and_payload(model, tool, payload));
     return {};
   };
+  if (const auto rules = rules_of(model.cell())) cell.idle_axes.insert(rules->idle_axes.begin(), rules->idle_axes.end());
   if (cell.X_WB) cell.gravity_B = cell.X_WB->linear().transpose() * model.cell().gravity_W;
   return cell;
 }
