@@ -305,8 +305,9 @@ std::vector<std::string> read_idle_axes(const YamlMap& axes) {
     axes.attempt([&] {
       const std::string carries = axes.text(name);
       if (carries != "carries nothing")
-        axes.refuse(name, refused("'{}', expected carries nothing; a rail that carries the robot is a joint of it", carries)
-                              .with_text(carries));
+        axes.refuse(name,
+                    refused("'{}', expected carries nothing; a rail that carries the robot is a joint of it", carries)
+                        .with_text(carries));
     });
   }
   return names;
@@ -356,16 +357,16 @@ std::optional<RobotConfirmation> read_confirmation(const YamlMap& map) {
 }
 
 Cell read_cell_map(const YamlMap& map) {
-  map.only({"version",        "cell",
-            "robot",          "base",
-            "gravity",        "tools",
-            "payloads",       "tracker",
-            "model",          "joint_ranges_deg",
-            "workspace_mm",   "sessions",
-            "tolerance_mm",   "step_limit_mm",
-            "prior",          "controller_compensates",
-            "anchors",        "serial_number",
-            "instrument",     "operator",
+  map.only({"version",         "cell",
+            "robot",           "base",
+            "gravity",         "tools",
+            "payloads",        "tracker",
+            "model",           "joint_ranges_deg",
+            "workspace_mm",    "sessions",
+            "tolerance_mm",    "step_limit_mm",
+            "prior",           "controller_compensates",
+            "anchors",         "serial_number",
+            "instrument",      "operator",
             "robot_confirmed", "axes"});
   Cell cell;
   map.attempt([&] {

@@ -135,7 +135,8 @@ TEST(ServiceText, WhatIsNotInForceComesWithTheNextCommand) {
 }
 
 TEST(ServiceText, ServersOfARecordThatDoNotAnswerClientsAreListedBesideThoseThatDo) {
-  auto servers = nlohmann::ordered_json::parse(R"([{"server": "a", "serves": true, "trains": true, "reachable": true}])");
+  auto servers =
+      nlohmann::ordered_json::parse(R"([{"server": "a", "serves": true, "trains": true, "reachable": true}])");
   add_other_servers(nlohmann::ordered_json::parse(R"([{"server": "a", "serves": true, "trains": true, "gone": false},
       {"server": "b", "serves": false, "trains": true, "gone": false},
       {"server": "c", "serves": true, "trains": false, "gone": true}, {"server": 7}, 3])"),

@@ -44,7 +44,8 @@ TEST(CellFile, EveryShippedRobotAndCellLoads) {
 TEST(CellFile, NamesExternalAxesThatCarryNothing) {
   const std::string text = *read_text_file(shipped("config/cell-7.yaml"));
   const std::string robot = *read_text_file(shipped("models/abb_irb6640-205-275.yaml"));
-  const Result<Cell> cell = parse_cell(text + "axes: {gun: carries nothing, 'group 2, axis 1': carries nothing}\n", robot, "c.yaml");
+  const Result<Cell> cell =
+      parse_cell(text + "axes: {gun: carries nothing, 'group 2, axis 1': carries nothing}\n", robot, "c.yaml");
   ASSERT_TRUE(cell) << cell.error().message;
   EXPECT_EQ(rules_of(*cell)->idle_axes, (std::vector<std::string>{"gun", "group 2, axis 1"}));
   const Result<Cell> carries = parse_cell(text + "axes: {rail: carries the robot}\n", robot, "c.yaml");

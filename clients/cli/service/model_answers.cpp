@@ -11,7 +11,8 @@ cam::CellTools tools_of(const CompensatedModel& model) {
     TRY(known_tool_and_payload(model, tool, payload));
     return {};
   };
-  if (const auto rules = rules_of(model.cell())) cell.idle_axes.insert(rules->idle_axes.begin(), rules->idle_axes.end());
+  if (const auto rules = rules_of(model.cell()))
+    cell.idle_axes.insert(rules->idle_axes.begin(), rules->idle_axes.end());
   if (cell.X_WB) cell.gravity_B = cell.X_WB->linear().transpose() * model.cell().gravity_W;
   return cell;
 }

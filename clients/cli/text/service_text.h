@@ -22,8 +22,8 @@ namespace trammel::cli {
 [[nodiscard]] nlohmann::ordered_json server_json(const client::ServerStatus& server);
 [[nodiscard]] std::string server_text(const client::ServerStatus& server);
 
-/// Adds to `servers`, which answered, those of the record that do not: they train only, or are gone (`reachable` false).
-/// `of_record`: as servers_text() takes them.
+/// Adds to `servers`, which answered, those of the record that do not: they train only, or are gone (`reachable`
+/// false). `of_record`: as servers_text() takes them.
 void add_other_servers(const nlohmann::ordered_json& of_record, nlohmann::ordered_json& servers);
 
 /// Of `record` as a server says it; empty where that is a file beside the server.
