@@ -132,6 +132,20 @@ TEST_F(Compare, AModelOfAnotherRobotIsRefusedWithASentence) {
   EXPECT_FALSE(read_text_file(file("none.json")));
 }
 
+TEST_F(Compare, ACheckIsNotHealthyWhereAZeroChangedAndStrictlyEndsWithOne) {
+  const std::vector<std::string> changed = {"check", "--model", file("before.model"), "--batch", file("fresh.csv"), "--json",
+                                            file("h.json")};
+  EXPECT_EQ(trammel(changed), 0);
+  const json told = json_in("h.json");
+  EXPECT_EQ(told.at("verdict"), "changed");
+  EXPECT_EQ(told.at("budget").at("lines").at(0).at("line"), "zero:4");
+  EXPECT_EQ(told.at("notes").back().at("code"), "robot_not_confirmed");
+  std::vector<std::string> strictly = changed;
+  strictly.emplace_back("--strict");
+  EXPECT_EQ(trammel(strictly), 1);
+  EXPECT_EQ(trammel({"check", "--model", file("now.model"), "--batch", file("fresh.csv"), "--strict"}), 0);
+}
+
 TEST_F(Compare, RemediesTellEachStepWhatItSetsAndWhatItLeaves) {
   ASSERT_EQ(trammel({"remedies", "--model", file("now.model"), "--json", file("r.json"), "-o", file("r.html")}), 0);
   const json told = json_in("r.json");

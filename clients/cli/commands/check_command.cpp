@@ -32,7 +32,7 @@ struct CheckArguments {
   std::string model, batch, json, report;
   std::vector<std::string> earlier;
   std::optional<double> tolerance_mm;
-  bool new_tool = false;
+  bool new_tool = false, strict = false;
   ServiceOptions service;
 };
 
@@ -90,6 +90,13 @@ void warn_of_notes_in(const nlohmann::ordered_json& check) {
   }
 }
 
+/// kPart where --strict asks for a healthy robot and this one is not shown to be.
+Extent extent_of(const nlohmann::ordered_json& check, const CheckArguments& arguments) {
+  if (!arguments.strict || check.at("verdict") == std::string(to_string(HealthVerdict::kHealthy))) return Extent::kAll;
+  std::fputs(shown_lines("not shown to be healthy: " + check_text(check)).c_str(), stderr);
+  return Extent::kPart;
+}
+
 Status check_outputs(const CheckArguments& arguments) {
   Outputs outputs;
   outputs.add("--report", arguments.report);
@@ -111,7 +118,7 @@ Status tell_health(client::Session& session, const std::string& cell, const Chec
   return write_json(arguments.json, {{"cells", cells}});
 }
 
-Status check_at_service(const CheckArguments& arguments) {
+Result<Extent> check_at_service(const CheckArguments& arguments) {
   if (arguments.new_tool) return failure(ErrorCode::kUsage, "--new-tool is for files").of("--new-tool");
   if (!arguments.earlier.empty()) return failure(ErrorCode::kUsage, "--earlier is for files").of("--earlier");
   const ModelReference model = TRY(parse_model_reference(arguments.model));
@@ -121,7 +128,10 @@ Status check_at_service(const CheckArguments& arguments) {
         .next("name the cell alone");
   }
   const auto session = TRY(open_session(arguments.service));
-  if (arguments.batch.empty()) return tell_health(*session, model.cell, arguments);
+  if (arguments.batch.empty()) {
+    TRY(tell_health(*session, model.cell, arguments));
+    return Extent::kAll;
+  }
   const std::int64_t job = TRY(ask(*session, model.cell, arguments));
   const client::JobStatus end = TRY([&] {
     ProgressLine progress;
@@ -133,10 +143,9 @@ Status check_at_service(const CheckArguments& arguments) {
   const auto json = TRY(found_by(*session, model.cell, job));
   warn_of_notes_in(json);
   tell(check_text(json), {arguments.json, arguments.report});
-  if (const Status written = write_report(json, {model.cell, batch_name(arguments.batch), unix_now()}, arguments);
-      !written)
-    return written;
-  return write_json(arguments.json, json);
+  TRY(write_report(json, {model.cell, batch_name(arguments.batch), unix_now()}, arguments));
+  TRY(write_json(arguments.json, json));
+  return extent_of(json, arguments);
 }
 
 /// What checks before this one saw of the arm's drift: files that `--json` wrote.
@@ -150,7 +159,7 @@ Result<std::vector<DriftSeen>> earlier_drift(const std::vector<std::string>& fil
   return all;
 }
 
-Status check(const CheckArguments& arguments) {
+Result<Extent> check(const CheckArguments& arguments) {
   if (arguments.batch.empty()) {
     return failure(ErrorCode::kUsage, "a check needs measurements")
         .of("--batch")
@@ -169,7 +178,8 @@ Status check(const CheckArguments& arguments) {
   warn_of_notes(notes_of(model));
   tell(health_text(health), {arguments.json, arguments.report});
   TRY(write_report(json, {model.cell().name, batch.id(), unix_now(), &model.cell()}, arguments));
-  return write_json(arguments.json, json);
+  TRY(write_json(arguments.json, json));
+  return extent_of(json, arguments);
 }
 
 }  // namespace
@@ -194,12 +204,13 @@ void add_check_command(CLI::App& app, Action& chosen) {
       ->check(above_zero());
   command->add_flag("--new-tool", arguments->new_tool,
                     "The tool was changed or mounted anew: where it sits is found with the base, and is no change");
+  command->add_flag("--strict", arguments->strict, "Exit with 1, not 0, where the robot is not shown to be healthy");
   command->add_option("--report", arguments->report, "Page to write (HTML); opens without a network")
       ->type_name("FILE");
   add_json_option(*command, arguments->json);
   add_service_options(*command, arguments->service);
   command->callback([arguments, &chosen] {
-    chosen = [arguments]() -> Status {
+    chosen = [arguments]() -> Result<Extent> {
       TRY(check_outputs(*arguments));
       return arguments->service.service ? check_at_service(*arguments) : check(*arguments);
     };

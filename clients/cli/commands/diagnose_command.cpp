@@ -128,7 +128,7 @@ Result<Extent> diagnose_files(const DiagnoseArguments& arguments) {
   std::optional<Result<Applied>> applied;
   if (arguments.apply) applied = apply(cell, batch, *diagnosis, arguments, json, outputs);
   TRY(write_diagnosis(json, diagnosis_page(*diagnosis, *cell), outputs, arguments));
-  if (!applied) return Extent::kAll;
+  if (!applied) return leaves_open(json, arguments) ? Extent::kPart : Extent::kAll;
   if (!*applied) return tl::make_unexpected(applied->error());
   return tell_applied(**applied, arguments);
 }
@@ -180,6 +180,8 @@ void add_diagnose_command(CLI::App& app, Action& chosen) {
                    "Where there are "
                    "none nothing is written, the reason goes to standard error, and the exit code is 0")
       ->type_name("FILE");
+  command->add_flag("--strict", arguments->strict,
+                    "Exit with 1, not 0, where the model lacks something that is not applied");
   add_seed_option(*command, arguments->seed, "Seed of the bootstrap and of the rows held out");
   CLI::Option* apply_flag = command->add_flag("--apply", arguments->apply,
                                               "Add what was found to the cell's error sources and train. Cell file and "

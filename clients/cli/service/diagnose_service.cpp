@@ -7,6 +7,7 @@
 #include "server/base/json_guard.h"
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
+#include "server/diagnose/diagnosis.h"
 #include "server/error_sources/cause_words.h"
 
 namespace trammel::cli {
@@ -55,6 +56,12 @@ Result<Findings> findings_of(const std::string& bytes, std::int64_t job) {
 
 }  // namespace
 
+bool leaves_open(const ordered_json& json, const DiagnoseArguments& arguments) {
+  if (!arguments.strict || json.at("verdict") == std::string(to_string(Verdict::kNothing))) return false;
+  fmt::print(stderr, "the model lacks something: {}\n", shown_lines(json.at("sentence").get<std::string>()));
+  return true;
+}
+
 Result<bool> diagnose_at_service(const DiagnoseArguments& arguments) {
   if (!arguments.model.empty() || !arguments.cell_out.empty()) {
     return failure(ErrorCode::kUsage, "--model and --cell-out are for files")
@@ -94,7 +101,8 @@ Result<bool> diagnose_at_service(const DiagnoseArguments& arguments) {
     return refused("the service has this page no more").in(arguments.report).of("--report");
   }
   TRY(write_diagnosis(json, std::move(found.page_html), outputs, arguments));
-  if (!arguments.apply || end.in_force) return true;
+  if (!arguments.apply) return !leaves_open(json, arguments);
+  if (end.in_force) return true;
   fmt::print(stderr, "not applied: cell {}: {}\n", cell, shown_lines(end.what));
   return false;
 }

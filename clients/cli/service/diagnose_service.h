@@ -14,7 +14,7 @@ struct DiagnoseArguments {
   std::string cell, report, next_poses, json, model, cell_out;
   std::vector<std::string> batches;  ///< at a service one at most
   std::uint64_t seed = 1;
-  bool apply = false;
+  bool apply = false, strict = false;
   ServiceOptions service;
 };
 
@@ -28,8 +28,11 @@ void say(const std::string& text, const DiagnoseArguments& arguments);
 [[nodiscard]] Status write_diagnosis(const nlohmann::ordered_json& json, std::string page, Outputs& outputs,
                                      const DiagnoseArguments& arguments);
 
+/// Whether --strict asks for a model that lacks nothing and this one lacks something, which it says on standard error.
+[[nodiscard]] bool leaves_open(const nlohmann::ordered_json& json, const DiagnoseArguments& arguments);
+
 /// Has a service diagnose one of its batches (`batches` names it; none: the newest) or a file, waits, and
-/// writes what it found. False where the result was to be put in force and was not, which it says on standard error.
+/// writes what it found. False where the result was to be put in force and was not, or leaves_open().
 [[nodiscard]] Result<bool> diagnose_at_service(const DiagnoseArguments& arguments);
 
 }  // namespace trammel::cli
