@@ -133,8 +133,8 @@ TEST_F(Compare, AModelOfAnotherRobotIsRefusedWithASentence) {
 }
 
 TEST_F(Compare, ACheckIsNotHealthyWhereAZeroChangedAndStrictlyEndsWithOne) {
-  const std::vector<std::string> changed = {"check", "--model", file("before.model"), "--batch", file("fresh.csv"), "--json",
-                                            file("h.json")};
+  const std::vector<std::string> changed = {"check",           "--model", file("before.model"), "--batch",
+                                            file("fresh.csv"), "--json",  file("h.json")};
   EXPECT_EQ(trammel(changed), 0);
   const json told = json_in("h.json");
   EXPECT_EQ(told.at("verdict"), "changed");

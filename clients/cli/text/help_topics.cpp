@@ -87,11 +87,12 @@ constexpr std::array kTopics = {
               "that has the option, cell only where a command needs one. What the command line says comes first. "
               "TRAMMEL_DEFAULTS= (empty) "
               "takes none."},
-    HelpTopic{"exit-codes", "what a script may rely on",
-              "0 done; 1 done but not all (targets left as they were, a new model not in force, findings of doctor, and of "
-              "diagnose and check where --strict asks); 2 "
-              "wrong usage; 3 refused data; 4 service unreachable or busy. With --json - a refusal is JSON too: "
-              "{\"error\": {code, message, file, row, field, value, limit, next, sentence}}."},
+    HelpTopic{
+        "exit-codes", "what a script may rely on",
+        "0 done; 1 done but not all (targets left as they were, a new model not in force, findings of doctor, and of "
+        "diagnose and check where --strict asks); 2 "
+        "wrong usage; 3 refused data; 4 service unreachable or busy. With --json - a refusal is JSON too: "
+        "{\"error\": {code, message, file, row, field, value, limit, next, sentence}}."},
 };
 
 constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
