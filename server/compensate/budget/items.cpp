@@ -88,10 +88,17 @@ void add_gearboxes(const PhysicalModel& model, std::size_t source, Eigen::Index 
   }
 }
 
+/// `joint_map:4` of `joint_map:4@8+20`: numbers that say how a cause is described are not its name; the pose that it
+/// begins at is.
+std::string line_of(const ErrorSource& source) {
+  const std::string name = source.name();
+  return source.cause().lasting == causes::Lasting::kFromAPose ? name : name.substr(0, name.find('@'));
+}
+
 BudgetItem whole(const PhysicalModel& model, std::size_t source, Eigen::Index first) {
   const ErrorSource& one = *model.sources[source];
   BudgetItem item;
-  item.line.line = one.name();
+  item.line.line = line_of(one);
   item.line.kind = one.cause().part == causes::Part::kBase ? LineKind::kBase : LineKind::kCause;
   item.line.cause = one.cause().spelling;
   item.line.joint = one.joint();
