@@ -17,7 +17,8 @@ struct ModelOnDisk {
   std::string hash;                 ///< that the store knows it by
   std::vector<std::string> copies;  ///< files beside the store
 };
-/// A model, and why it was not read from the store but from a copy: one sentence, or empty.
+/// A model, and why it was not read from the store but from a copy: one sentence, or empty. Also where only the hash
+/// that the store has of it is bad.
 struct ReadModel {
   CompensatedModel model;
   std::string damage = {};
@@ -36,8 +37,7 @@ class ServedModels {
   /// Refuses (kRefused) what is no store. A file that is not there has no models.
   [[nodiscard]] static Result<ServedModels> open(const std::string& place);
 
-  /// False: nothing of the cell was ever in force.
-  [[nodiscard]] Result<bool> has(const std::string& cell) const;
+  /// A version that was in force and is not in the store has an error (kNotFound) as its text.
   [[nodiscard]] Result<bool> find(const std::string& cell, const ModelVisitor& serves) const;
 
  private:

@@ -27,11 +27,7 @@ Result<CellAtStart> look_at(const ServedModels& models, const std::string& name,
     }
     return good || fits_not;  // of a model that does not fit, no other version takes the place
   }));
-  if (one.version == 0) {
-    const auto has = TRY(models.has(name));
-    if (has) one.why = fmt::format("the versions of cell {} that were in force are not there", name);
-    if (!has) one.state = State::kUntrained;
-  }
+  if (one.version == 0) one.state = State::kUntrained;  // nothing was ever in force
   return one;
 }
 
