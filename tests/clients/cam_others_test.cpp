@@ -297,6 +297,16 @@ TEST(UrScript, WhatAnOffsetOrAForceMovesIsLeftUntilItEnds) {
   }
 }
 
+TEST(UrScript, WhatMovesWhileSomebodyLeadsTheArmIsLeft) {
+  for (const auto& [begin, end] :
+       {std::pair("freedrive_mode()", "end_freedrive_mode()"), std::pair("teach_mode()", "end_teach_mode()")}) {
+    const std::string led = "  " + std::string(begin) + "\n  movel(" + kPose + ")\n  " + end + "\n";
+    const test::Corrected made = script(with_lines(led + "  movej([0, -0.3, 0.3, 0, 0.5, 0])\n"));
+    EXPECT_NE(why(made, kPose).find("the arm gives way"), std::string::npos) << begin << ": " << why(made, kPose);
+    EXPECT_EQ(made.program.left_alone(), 1u) << made.refusal;
+  }
+}
+
 TEST(UrScript, TheMotionsThatChooseTheirOwnSpeedAreMotions) {
   const test::Corrected made = script(with_lines("  optimovel(" + kPose + ", a=0.5, v=0.5)\n"));
   EXPECT_TRUE(row_of(made.program, kPose).corrected()) << made.refusal << why(made, kPose);

@@ -194,6 +194,11 @@ TEST(RunTimeFanuc, WhatGivesWayAndPointsOfAPalletAreLeft) {
       "   1:  SOFTFLOAT[1] ;\n   2:L P[1] 100mm/sec FINE ;\n   3:  SOFTFLOAT END ;\n   4:L P[2] 100mm/sec FINE ;\n");
   EXPECT_TRUE(has(why(soft, "P[1]"), "SOFTFLOAT (line 4)")) << why(soft, "P[1]");
   EXPECT_TRUE(is_corrected(soft, "P[2]")) << why(soft, "P[2]");
+  const test::Corrected limited = made(
+      "   1:  TORQ_LIMIT 50.0% ;\n   2:L P[1] 100mm/sec FINE ;\n   3:  TORQ_LIMIT 100.0% ;\n   4:L P[2] 100mm/sec FINE "
+      ";\n");
+  EXPECT_TRUE(has(why(limited, "P[1]"), "TORQ_LIMIT (line 4)")) << why(limited, "P[1]");
+  EXPECT_TRUE(is_corrected(limited, "P[2]")) << why(limited, "P[2]");
   const test::Corrected pallet = made("   1:  PALLETIZING-B_1 ;\n   2:L PAL_1[BTM] 100mm/sec FINE ;\n");
   EXPECT_TRUE(has(why(pallet, "PAL_1"), "it is no point of /POS")) << why(pallet, "PAL_1");
 }
@@ -334,6 +339,20 @@ TEST(RunTimeKrl, WhatASensorCorrectsIsLeftUntilItEnds) {
   EXPECT_TRUE(is_corrected(made, kVia)) << why(made, kVia);
   EXPECT_TRUE(has(why(made, kPose), "a sensor corrects the path (RSI_ON, p.src line 5)")) << why(made, kPose);
   EXPECT_TRUE(made.program.rows.back().corrected()) << made.program.rows.back().message;
+}
+
+TEST(RunTimeKrl, WhatMovesWithLimitedTorquesIsLeftUntilTheyAreWhole) {
+  const std::pair<std::string, std::string> ways[] = {{"SET_TORQUE_LIMITS(3,lims)", "RESET_TORQUE_LIMITS(3)"},
+                                                      {"$CURR_RED[3,1]=20", "$CURR_RED[3,1]=100"},
+                                                      {"$TORQUE_AXIS='B000100'", "$TORQUE_AXIS=0"}};
+  for (const auto& [begins, ends] : ways) {
+    const test::Corrected made = krl("LIN " + kVia + "\n" + begins + "\nLIN " + kPose + "\n" + ends +
+                                     "\nLIN {X 305,Y -250,Z 300,A 0,B 60,C 0}\n");
+    EXPECT_TRUE(is_corrected(made, kVia)) << why(made, kVia);
+    EXPECT_TRUE(has(why(made, kPose), "a force may move the axes")) << begins << ": " << why(made, kPose);
+    EXPECT_TRUE(has(why(made, kPose), "p.src line 5)")) << why(made, kPose);
+    EXPECT_TRUE(made.program.rows.back().corrected()) << begins << ": " << made.program.rows.back().message;
+  }
 }
 
 TEST(RunTimeKrl, ARobotThatHangsByItsRobrootAndStandsByTheCellIsANote) {

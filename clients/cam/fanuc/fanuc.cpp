@@ -173,6 +173,12 @@ class File {
       const std::string what = last.is("[") ? "" : " " + shown(statement[1].text);
       selected.follows = ends ? "" : fmt::format("{}{} (line {})", statement[0].text, what, statement[0].line);
     }
+    if (statement[0].is("TORQ_LIMIT") && statement.size() > 1) {
+      constexpr double kWhole = 100;  // percent
+      const auto limit = read_number(statement[1].text);
+      const bool ends = limit && limit->value >= kWhole;
+      selected.follows = ends ? "" : fmt::format("TORQ_LIMIT (line {})", statement[0].line);
+    }
     for (std::size_t at = 0; at + 1 < statement.size(); ++at) {
       const bool calls = statement[at].is("CALL") && !controller_.programs.contains(called_by(statement));
       if (!calls && !statement[at].is("RUN")) continue;

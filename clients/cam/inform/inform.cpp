@@ -1,11 +1,13 @@
 #include "clients/cam/inform/inform.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <set>
 
 #include "clients/cam/flow.h"
+#include "clients/cam/inform/conditions.h"
 #include "clients/cam/scan.h"
 #include "clients/cam/sites.h"
 #include "server/base/plain_text.h"
@@ -37,10 +39,29 @@ struct Displaced {
   bool operator==(const Displaced&) const = default;
 };
 
+/// What the condition files say, and the names of it that jobs use, by the file.
+struct Controller {
+  std::map<std::string, inform::Condition> conditions;
+  std::map<std::string, std::set<std::string>> taken;
+
+  /// nullptr: they say nothing of it.
+  const inform::Condition* take(const std::string& name) {
+    const auto known = conditions.find(name);
+    if (known == conditions.end()) return nullptr;
+    if (known->second.why_not.empty()) taken[known->second.file].insert(name);
+    return &known->second;
+  }
+};
+
 class Job {
  public:
-  Job(std::size_t index, Program& program, Sites& sites, const ReadOptions& options)
-      : index_(index), program_(program), sites_(sites), options_(options), text_(program.files[index].text) {}
+  Job(std::size_t index, Program& program, Sites& sites, const ReadOptions& options, Controller& controller)
+      : index_(index),
+        program_(program),
+        sites_(sites),
+        options_(options),
+        controller_(controller),
+        text_(program.files[index].text) {}
 
   void read() {
     program_.mark_places.push_back({text_.size(), "'", "", true});
@@ -240,8 +261,15 @@ class Job {
   std::size_t tool_of(const Position& position) {
     ProgramTool tool;
     tool.name = fmt::format("TOOL[{}]", position.tool.empty() ? "0" : position.tool.substr(0, position.tool.find(',')));
-    take_row(tool.name, options_, tool);
-    tool.why_not = why_set(tool.name, "TOOL[*]");
+    const bool by_row = take_row(tool.name, options_, tool);
+    if (const inform::Condition* condition = controller_.take(tool.name); condition != nullptr) {
+      tool.why_not = by_row ? against(*condition, tool.row, *tool.X_FT) : condition->why_not;
+      tool.load = condition->load;
+      tool.file = condition->file;
+      tool.line = condition->line;
+      if (!by_row && tool.why_not.empty()) tool.X_FT = condition->X;
+    }
+    if (std::string set = why_set(tool.name, "TOOL[*]"); !set.empty()) tool.why_not = std::move(set);
     for (std::size_t k = 0; k < program_.tools.size(); ++k) {
       if (program_.tools[k].name == tool.name) return k;
     }
@@ -257,14 +285,31 @@ class Job {
       frame.why_not = why_set(frame.name, "USER[*]");
       if (frame.why_not.empty()) frame.why_not = why_set(frame_of_call(name_), "");
       if (!frame.why_not.empty()) return add_once(program_, std::move(frame));
-      if (!take_row(frame.name, options_, frame))
-        frame.why_not = fmt::format("{} is not in the job: --frames tells its value", shown(frame.name));
+      take_user_frame(frame);
     } else if (position.kind == "ROBOT") {
       frame.in_base = true;
     } else if (position.kind != "BASE" && position.kind != "PULSE") {
       frame.why_not = fmt::format("frame {} is not known", shown(position.kind));
     }
     return add_once(program_, std::move(frame));
+  }
+
+  /// Rows are seen from the robot's base, and so are the controller's user frames.
+  void take_user_frame(ProgramFrame& frame) const {
+    const bool by_row = take_row(frame.name, options_, frame);
+    const inform::Condition* condition = controller_.take(frame.name);
+    if (condition == nullptr) {
+      if (!by_row)
+        frame.why_not = fmt::format("{} is not in the files handed over: --frames tells its value", shown(frame.name));
+      return;
+    }
+    frame.why_not = by_row ? against(*condition, frame.row, frame.X_BO) : condition->why_not;
+    if (!by_row) frame.X_BO = condition->X;
+    frame.in_base = true;
+  }
+  static std::string against(const inform::Condition& condition, const std::string& row, const Pose& X) {
+    if (!condition.why_not.empty()) return condition.why_not;
+    return against_row(row, X, condition.X, fmt::format("{} line {}", condition.file, condition.line));
   }
 
   /// Why a frame or tool is not what it was; empty: no job sets it.
@@ -369,6 +414,7 @@ class Job {
   Program& program_;
   Sites& sites_;
   const ReadOptions& options_;
+  Controller& controller_;
   const std::string& text_;
   int jobs_at_ = 0;  ///< the line of a job's head that has no end yet
   Position now_;
@@ -430,10 +476,14 @@ Program read_inform(std::vector<SourceFile> files, const ReadOptions& options) {
   program.dialect = "inform";
   program.files = std::move(files);
   Sites sites;
+  Controller controller{inform::conditions(options.beside), {}};
   std::vector<Job> jobs;
   jobs.reserve(program.files.size());
-  for (std::size_t f = 0; f < program.files.size(); ++f) jobs.emplace_back(f, program, sites, options).read();
+  for (std::size_t f = 0; f < program.files.size(); ++f)
+    jobs.emplace_back(f, program, sites, options, controller).read();
   read_motions(jobs);
+  for (const auto& [file, names] : controller.taken)
+    program.notes.push_back(fmt::format("{}: taken from {}", fmt::join(names, ", "), file));
   sites.finish(program,
                [&](const Site& site, ProgramTarget& target) { return jobs[site.file].describe(site, target); });
   return program;

@@ -352,6 +352,7 @@ class Reader {
         program_.files[f].text.substr(operands.front().begin, operands.back().end - operands.front().begin);
     if (!state.fixed_tool.empty()) return leave(f, k, name, state.fixed_tool);
     if (!state.sensed.empty()) return leave(f, k, name, state.sensed);
+    if (!state.soft.empty()) return leave(f, k, name, state.soft);
     const SiteUse use{state.tool,
                       state.frame,
                       lines_[f][k].tokens[0].text,

@@ -26,6 +26,7 @@ void Setting::set(std::size_t f, std::size_t k, State& state) {
   const bool assigns = tokens.size() > 2 && tokens[1].text == "=";
   std::size_t end = 0;
   set_sensor(tokens, f, k, state);
+  set_soft(tokens, f, k, state);
   sets_by_hand_ |= word == "$TOOL" || word == "$BASE";
   if (word == "$TOOL" && assigns) {
     state.tool = tools_.tool_set(operands_at(tokens, 2, &end), f, k);
@@ -65,6 +66,7 @@ void Setting::join(State& state, const State& other, const std::string& by) {
     state.load = tools_.add_load({"$LOAD", std::nullopt, "", "$LOAD: " + why});
   if (state.fixed_tool != other.fixed_tool && state.fixed_tool.empty()) state.fixed_tool = why;
   if (state.sensed.empty()) state.sensed = other.sensed;
+  if (state.soft.empty()) state.soft = other.soft;
   state.armed |= other.armed;
   state.speed = std::max(state.speed, other.speed);
 }
@@ -113,6 +115,31 @@ void Setting::set_sensor(const std::vector<Token>& tokens, std::size_t f, std::s
       state.sensed = fmt::format("a sensor corrects the path ({}, {})", tokens[at].text, names_.place(f, k));
     if (kEnds.contains(tokens[at].text)) state.sensed.clear();
   }
+}
+
+/// `SET_TORQUE_LIMITS(3, lims)`, `RESET_TORQUE_LIMITS(3)`; `$CURR_RED[3,1]=20` (percent) and `$TORQUE_AXIS=4` (a bit an
+/// axis) of older ones: axes with less torque give way.
+void Setting::set_soft(const std::vector<Token>& tokens, std::size_t f, std::size_t k, State& state) const {
+  constexpr double kFullCurrent = 100;
+  const auto begins = [&](const std::string& what) {
+    state.soft = fmt::format("a force may move the axes, whose torques are limited ({}, {})", what, names_.place(f, k));
+  };
+  for (std::size_t at = 0; at + 1 < tokens.size(); ++at) {
+    if (tokens[at + 1].text != "(" || declares(tokens)) continue;
+    if (tokens[at].text == "SET_TORQUE_LIMITS") begins(tokens[at].text);
+    if (tokens[at].text == "RESET_TORQUE_LIMITS") state.soft.clear();
+  }
+  const std::string& word = tokens[0].text;
+  if (word != "$CURR_RED" && word != "$TORQUE_AXIS") return;
+  const auto equals = std::find_if(tokens.begin(), tokens.end(), [](const Token& token) { return token.text == "="; });
+  if (equals == tokens.end() || equals + 1 == tokens.end()) return;
+  const bool alone = equals + 2 == tokens.end() && (equals + 1)->kind == TokenKind::kNumber;
+  const auto number = alone ? read_number((equals + 1)->text) : std::nullopt;
+  const double stiff = word == "$CURR_RED" ? kFullCurrent : 0;
+  if (number && number->value == stiff)
+    state.soft.clear();
+  else
+    begins(word);
 }
 
 /// `$VEL.CP=0.25`, `$VEL={CP 0.25,...}`, `$VEL=SVEL_CP(0.25, , LCPDAT1)`, m/s.

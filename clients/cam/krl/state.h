@@ -18,6 +18,7 @@ struct State {
   std::size_t load = 0;          ///< 0: the tool's own
   std::string fixed_tool;        ///< why the robot does not hold the tool; empty: it does
   std::string sensed;            ///< why a sensor moves the path; empty: none does
+  std::string soft;              ///< why a force may move the axes; empty: none may
   std::uint64_t armed = 0;       ///< interrupts that are declared, a bit each
   double speed = kSpeedUnknown;  ///< of the tool, mm/s
   auto operator<=>(const State&) const = default;
@@ -40,6 +41,7 @@ class Setting {
  private:
   void apply_fdat(const std::string& name, std::size_t f, State& state);
   void set_sensor(const std::vector<Token>& tokens, std::size_t f, std::size_t k, State& state) const;
+  void set_soft(const std::vector<Token>& tokens, std::size_t f, std::size_t k, State& state) const;
   static double speed_at(const std::vector<Token>& tokens, std::size_t at);
   static double speed_of(const std::vector<Token>& tokens, std::size_t at);
   void set_by_bas(const std::vector<Token>& tokens, std::size_t f, std::size_t k, State& state);

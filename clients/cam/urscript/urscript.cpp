@@ -12,6 +12,7 @@
 #include "clients/cam/nominal_targets.h"
 #include "clients/cam/scan.h"
 #include "clients/cam/sites.h"
+#include "clients/cam/urscript/loads.h"
 #include "clients/cam/urscript/values.h"
 #include "server/base/plain_text.h"
 #include "server/base/units.h"
@@ -24,39 +25,37 @@ using urscript::Assignment;
 using urscript::defines;
 using urscript::is_function_of_poses;
 using urscript::kUndecided;
+using urscript::Load;
+using urscript::Loads;
 using urscript::numbers_in;
 using urscript::Settings;
 using urscript::Told;
 using urscript::Value;
 using urscript::Variable;
 
-/// What `set_payload` said.
-struct Load {
-  std::string name;
-  std::optional<StatedLoad> load;
-  std::string why_not;
-};
-
 /// Moves the tool away from where motions say, from one function to another.
 struct Superposed {
-  std::set<std::string_view> begins;
-  std::string_view ends;
+  std::set<std::string_view> begins, ends;
   const char* why;
 };
-const std::array<Superposed, 3>& superposed() {
-  static const std::array<Superposed, 3> kAll = {
+constexpr std::size_t kSuperposed = 4;
+const std::array<Superposed, kSuperposed>& superposed() {
+  static const std::array<Superposed, kSuperposed> kAll = {
       {{{"track_conveyor_linear", "track_conveyor_circular"},
-        "stop_conveyor_tracking",
+        {"stop_conveyor_tracking"},
         "it is seen from a conveyor that moves"},
-       {{"path_offset_enable"}, "path_offset_disable", "an offset is added to the path"},
-       {{"force_mode"}, "end_force_mode", "a force decides where the tool goes"}}};
+       {{"path_offset_enable"}, {"path_offset_disable"}, "an offset is added to the path"},
+       {{"force_mode"}, {"end_force_mode"}, "a force decides where the tool goes"},
+       {{"freedrive_mode", "teach_mode"},
+        {"end_freedrive_mode", "end_teach_mode"},
+        "the arm gives way to whoever leads it"}}};
   return kAll;
 }
 
 /// What is set when a motion comes.
 struct State {
-  std::size_t tool = 0, load = 0;   ///< load 0: not said
-  std::array<int, 3> superposed{};  ///< the line that begins each; 0: it does not hold
+  std::size_t tool = 0, load = 0;             ///< load 0: not said
+  std::array<int, kSuperposed> superposed{};  ///< the line that begins each; 0: it does not hold
   Settings settings = {};
   bool operator==(const State&) const = default;
 };
@@ -206,12 +205,12 @@ class Script {
     if (at + 1 >= pieces_.size() || !pieces_[at + 1].is("(")) return;
     for (std::size_t k = 0; k < state.superposed.size(); ++k) {
       if (superposed()[k].begins.contains(pieces_[at].text)) state.superposed[k] = pieces_[at].line;
-      if (pieces_[at].is(superposed()[k].ends)) state.superposed[k] = 0;
+      if (superposed()[k].ends.contains(pieces_[at].text)) state.superposed[k] = 0;
     }
     if (pieces_[at].is("set_tcp")) state.tool = tool_set(at);
     if (pieces_[at].is("set_payload") || pieces_[at].is("set_target_payload") || pieces_[at].is("set_payload_mass") ||
         pieces_[at].is("set_payload_cog"))
-      state.load = load_set(at, state.load);
+      state.load = loads_.set(pieces_, at, state.load, program_.files[index_].name);
   }
 
   void join(State& state, const State& other, const std::string& by) {
@@ -231,59 +230,7 @@ class Script {
       state.tool = known_tool(std::move(tool));
     }
     if (state.load != other.load && loads_[state.load].why_not.empty())
-      state.load = known_load({"set_payload", std::nullopt, "set_payload: " + why});
-  }
-
-  std::size_t known_load(Load load) {
-    for (std::size_t k = 1; k < loads_.size(); ++k) {
-      const Load& known = loads_[k];
-      const bool same = known.load.has_value() == load.load.has_value() &&
-                        (!load.load || (known.load->mass == load.load->mass && known.load->p_F == load.load->p_F &&
-                                        known.load->has_centre == load.load->has_centre));
-      if (same && known.why_not == load.why_not) return k;
-    }
-    loads_.push_back(std::move(load));
-    return loads_.size() - 1;
-  }
-
-  /// `set_payload(40, [0, 0, 0.1])`: all that the flange carries, kg and m.
-  std::size_t load_set(std::size_t at, std::size_t before) {
-    const std::string where =
-        fmt::format("{} ({} line {})", pieces_[at].text, program_.files[index_].name, pieces_[at].line);
-    Load load{where, std::nullopt, ""};
-    StatedLoad stated;
-    stated.has_centre = false;
-    const std::optional<StatedLoad>& known = loads_[before].load;
-    std::size_t next = at + 2;
-    bool constant = true;
-    if (pieces_[at].is("set_payload_cog")) {
-      if (!known) return before;
-      stated = *known;
-    } else {
-      if (known && pieces_[at].is("set_payload_mass")) stated = *known;
-      constant = next + 1 < pieces_.size() && pieces_[next].kind == Piece::Kind::kNumber &&
-                 (pieces_[next + 1].is(",") || pieces_[next + 1].is(")"));
-      if (constant) stated.mass = read_number(pieces_[next].text).value_or(WrittenNumber{}).value;
-      next += 2;
-    }
-    if (constant && !pieces_[at].is("set_payload_mass") && next < pieces_.size() && pieces_[next - 1].text != ")") {
-      std::vector<double> centre;
-      constant = pieces_[next].is("[");
-      for (++next; constant && next < pieces_.size() && !pieces_[next].is("]"); ++next) {
-        if (pieces_[next].kind == Piece::Kind::kNumber)
-          centre.push_back(read_number(pieces_[next].text).value_or(WrittenNumber{}).value);
-        else if (!pieces_[next].is(","))
-          constant = false;
-      }
-      constant = constant && centre.size() == 3;
-      if (constant) stated.p_F = Vector3(centre[0], centre[1], centre[2]);
-      stated.has_centre = true;
-    }
-    if (constant)
-      load.load = stated;
-    else
-      load.why_not = where + " is not constant";
-    return known_load(std::move(load));
+      state.load = loads_.add({"set_payload", std::nullopt, "set_payload: " + why});
   }
 
   std::size_t known_tool(ProgramTool tool) {
@@ -506,11 +453,11 @@ class Script {
   urscript::Values values_of_{pieces_, program_.files[index_].name};
   std::vector<Step> steps_;
   std::vector<std::size_t> step_at_;  ///< the piece of each
-  std::vector<Load> loads_ = std::vector<Load>(1);
+  Loads loads_;
   std::map<std::pair<std::size_t, std::size_t>, std::size_t> carrying_;
   std::map<std::size_t, std::string> read_;     ///< why the numbers at a place must stay
   std::size_t tool_ = 0;                        ///< of the motion that is read
-  std::array<int, 3> superposed_{};             ///< the same
+  std::array<int, kSuperposed> superposed_{};   ///< the same
   std::map<std::size_t, std::size_t> move_of_;  ///< of Program::moves, by the step
   std::vector<const Assignment*> sets_;         ///< of each step; nullptr: it is no such one
   std::map<std::size_t, Value> values_;

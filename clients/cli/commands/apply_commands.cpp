@@ -283,7 +283,7 @@ void add_reading_options(CLI::App& command, std::string& format, std::string& fr
           "--frames", frames,
           "Values of tools and frames that the program leaves to the controller (CSV: "
           "name,x_mm,y_mm,z_mm,qw,qx,qy,qz; UFRAME[1], BASE_DATA[2], ...; robot_base: where the robot stands in "
-          "the controller's world)")
+          "the controller's world), or a controller's own list: SYSFRAME.VA (FANUC), TOOL.CND, UFRAME.CND (Yaskawa)")
       ->group(group);
   command
       .add_option("--idle-axis", idle_axes,

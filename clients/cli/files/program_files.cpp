@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -15,6 +14,7 @@
 #include "clients/cam/backup/backup.h"
 #include "clients/cam/mark.h"
 #include "clients/cam/stated_robot.h"
+#include "clients/cli/files/controller_files.h"
 #include "server/base/letters.h"
 #include "server/base/plain_text.h"
 #include "server/base/text_file.h"
@@ -27,7 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kLargest = std::size_t{1} << 28;  // bytes
+constexpr const char* kOfPolyScope = ".urp";  // of Universal Robots
 
 struct Found {
   std::string name, path;
@@ -61,35 +61,6 @@ std::vector<Found> programs_in(const std::string& folder, const std::optional<ca
   return found;
 }
 
-/// Whether a file of a folder belongs to the controller and not to a program: KUKA's `$config.dat` and its folders
-/// System, Mada and Steu, ABB's system modules and parameters.
-bool is_of_the_controller(const std::string& name) {
-  static const std::set<std::string> kFolders = {"system", "mada", "steu", "sysmod", "syspar"};
-  static const std::set<std::string> kFiles = {"base.sys", "user.sys"};
-  const fs::path path(name);
-  const std::string file = path.filename().string();
-  if (file.starts_with('$') || kFiles.contains(lower(file))) return true;
-  return std::any_of(path.begin(), path.end(),
-                     [&](const fs::path& part) { return kFolders.contains(lower(part.string())); });
-}
-
-/// ABB's system parameters.
-const std::set<std::string> kParameters = {"moc.cfg"};
-/// FANUC's system variables that hold frames and tools, as text.
-const std::set<std::string> kSystemFrames = {"sysframe.va", "framevar.va"};
-
-/// The files of a folder that are called so, in lower case.
-Result<std::vector<cam::SourceFile>> files_called(const std::set<std::string>& names, const std::string& folder) {
-  std::vector<cam::SourceFile> found;
-  std::error_code error;
-  for (fs::recursive_directory_iterator it(folder, error), end; !error && it != end; it.increment(error)) {
-    if (!names.contains(lower(it->path().filename().string())) || !it->is_regular_file(error)) continue;
-    std::string text = TRY(read_text_file(it->path().string(), kLargest));
-    found.push_back({fs::relative(it->path(), folder, error).string(), std::move(text)});
-  }
-  return found;
-}
-
 /// Keeps those below the folder of a task, and returns the others.
 std::vector<Found> keep_task(const std::string& task, std::vector<Found>& programs) {
   const auto others = std::stable_partition(programs.begin(), programs.end(), [&](const Found& program) {
@@ -104,7 +75,7 @@ std::vector<Found> keep_task(const std::string& task, std::vector<Found>& progra
 
 Status read_into(std::vector<cam::SourceFile>& files, const std::vector<Found>& found) {
   for (const Found& file : found) {
-    std::string text = TRY(read_text_file(file.path, kLargest));
+    std::string text = TRY(read_text_file(file.path, kLargestProgram));
     files.push_back({file.name, std::move(text)});
   }
   return {};
@@ -112,7 +83,8 @@ Status read_into(std::vector<cam::SourceFile>& files, const std::vector<Found>& 
 
 Result<std::string> standard_input() {
   std::string text{std::istreambuf_iterator<char>(std::cin), {}};
-  if (text.size() > kLargest) return failure(ErrorCode::kTooLarge, "more than {} bytes", kLargest).in("standard input");
+  if (text.size() > kLargestProgram)
+    return failure(ErrorCode::kTooLarge, "more than {} bytes", kLargestProgram).in("standard input");
   return text;
 }
 
@@ -122,10 +94,23 @@ bool same_file(const std::string& a, const std::string& b) {
   return fs::equivalent(a, b, error) || place(a) == place(b);
 }
 
+/// Refuses a file of which nobody says what it is.
+Status check_kind(const std::string& path, bool is_said) {
+  if (lower(fs::path(path).extension().string()) == kOfPolyScope)
+    return refused("PolyScope's own program is not read")
+        .in(path)
+        .next("hand over the .script that PolyScope saves beside it");
+  if (is_said || cam::dialect_of_file(path)) return {};
+  return failure(ErrorCode::kUsage, "what kind of program is it?")
+      .in(path)
+      .next(fmt::format("--format says it: {}", cam::dialect_names()));
+}
+
 }  // namespace
 
 bool is_program(const std::vector<std::string>& inputs, const std::string& format) {
   if (!format.empty()) return format != "csv";
+  if (inputs.size() == 1 && lower(fs::path(inputs[0]).extension().string()) == kOfPolyScope) return true;
   return inputs.size() != 1 || inputs[0] == "-" || fs::is_directory(inputs[0]) ||
          cam::dialect_of_file(inputs[0]).has_value();
 }
@@ -141,6 +126,7 @@ Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, 
         .with_text(format);
   }
   std::vector<Found> found;
+  std::vector<std::string> folders;
   for (const std::string& input : inputs) {
     std::error_code error;
     if (fs::is_directory(input, error)) {
@@ -151,11 +137,7 @@ Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, 
       if (inside.empty())
         return refused("no programs of a task {}", shown(task)).in(input).of("--task").with_text(task);
       TRY(read_into(program.beside, other_tasks));
-      for (const auto& [names, into] :
-           {std::pair(kParameters, &program.parameters), std::pair(kSystemFrames, &program.beside)}) {
-        std::vector<cam::SourceFile> files = TRY(files_called(names, input));
-        into->insert(into->end(), files.begin(), files.end());
-      }
+      folders.push_back(input);
       found.insert(found.end(), inside.begin(), inside.end());
       for (const Found& file : inside)
         if (is_of_the_controller(file.name)) program.system.insert(file.name);
@@ -168,11 +150,7 @@ Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, 
   std::set<std::string> names;
   for (const Found& file : found) {
     const auto own = cam::dialect_of_file(file.path);
-    if (!wanted && !own) {
-      return failure(ErrorCode::kUsage, "what kind of program is it?")
-          .in(file.path)
-          .next(fmt::format("--format says it: {}", cam::dialect_names()));
-    }
+    TRY(check_kind(file.path, wanted.has_value()));
     if (!wanted && dialect && own != dialect) {
       return failure(ErrorCode::kUsage, "a {} program beside a {} one", cam::name_of(*own), cam::name_of(*dialect))
           .in(file.path)
@@ -180,12 +158,14 @@ Result<ProgramFiles> read_program_files(const std::vector<std::string>& inputs, 
     }
     if (!dialect) dialect = own;
     if (!names.insert(file.name).second) return refused("two files of the name {}", file.name).in(file.path);
-    std::string text = TRY(file.path == "-" ? standard_input() : read_text_file(file.path, kLargest));
+    std::string text = TRY(file.path == "-" ? standard_input() : read_text_file(file.path, kLargestProgram));
     program.files.push_back({file.name, std::move(text)});
     program.paths.push_back(file.path);
   }
   program.dialect = dialect.value_or(cam::Dialect::kRapid);
-  if (program.dialect != cam::Dialect::kRapid) program.parameters.clear();
+  for (const std::string& folder : folders) {
+    TRY(read_values(folder, program));
+  }
   return program;
 }
 
@@ -293,12 +273,13 @@ Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOpti
   const auto robots = TRY(robots_of(files));
   for (const cam::ControllerRobot& robot : robots) cam::take_stated(cam::stated_by(robot), options.stated);
   std::vector<GivenPose> rows;
-  if (!frames.empty()) {
-    std::vector<GivenPose> given = TRY(read_frames_csv(frames));
-    rows = std::move(given);
+  options.beside = files.beside;
+  if (is_listing(frames)) {
+    options.beside.push_back(TRY(read_listing(frames, files.dialect)));
+  } else if (!frames.empty()) {
+    rows = TRY(read_frames_csv(frames));
   }
   for (const GivenPose& row : rows) options.frames.emplace(row.name, row.X);
-  options.beside = files.beside;
   cam::Program program = cam::read_program(files.dialect, files.files, options);
   TRY(cam::check_files(program));
   for (const cam::ControllerRobot& robot : robots) {
@@ -307,6 +288,7 @@ Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOpti
           fmt::format("{} line {}: {} carries {}, so that where the robot stands is not taken from there", robot.file,
                       robot.line, shown(robot.carried_by), shown(robot.unit)));
   }
+  program.notes.insert(program.notes.end(), files.not_read.begin(), files.not_read.end());
   TRY(cam::take_idle_axes(program, options.idle_axes));
   if (program.is_understood()) {
     TRY(check_used(rows, frames, program, files.dialect));
@@ -330,7 +312,7 @@ Result<ProgramFiles> originals_of(const ProgramFiles& program, bool all) {
     any = true;
     const std::string kept = cam::original_path(before.paths[k]);
     Result<std::string> text =
-        before.paths[k] == "-" ? Result<std::string>(refused("not kept")) : read_text_file(kept, kLargest);
+        before.paths[k] == "-" ? Result<std::string>(refused("not kept")) : read_text_file(kept, kLargestProgram);
     if (!text) {
       return refused("its original is not kept beside it as {}", fs::path(kept).filename().string())
           .in(before.paths[k])

@@ -21,7 +21,8 @@ struct ProgramFiles {
       {};  ///< names of files that belong to the controller and were found in a folder: read, not written
   std::vector<cam::SourceFile> parameters = {};  ///< MOC.cfg of an ABB backup that a folder is
   std::string task = {};                         ///< of RAPID, whose modules were taken; empty: of all
-  std::vector<cam::SourceFile> beside = {};      ///< read for values alone: other tasks, FANUC's system variables
+  std::vector<cam::SourceFile> beside = {};      ///< read for values alone: other tasks, lists of frames and tools
+  std::vector<std::string> not_read = {};        ///< what speaks of the robot and is not read: a sentence each
 };
 
 /// Whether the inputs are a robot program. Otherwise they are one table of targets (.csv).
@@ -34,7 +35,8 @@ struct ProgramFiles {
                                                       const std::string& task = "");
 
 /// What cam::read_program() makes of the files. `frames`: values of tools and frames that they leave open, or empty
-/// (CSV: `name,x_mm,y_mm,z_mm,qw,qx,qy,qz`; frames seen from the robot's base, tools from the flange). Refuses a
+/// (CSV: `name,x_mm,y_mm,z_mm,qw,qx,qy,qz`; frames seen from the robot's base, tools from the flange; or a controller's
+/// own list: FANUC's SYSFRAME.VA, Yaskawa's TOOL.CND or UFRAME.CND, as in a folder). Refuses a
 /// program without a single motion or target in any of them, a backup of several robots of which no task is taken, and
 /// rows of `frames` that nothing uses, unless their column `may_be_unused` says yes.
 [[nodiscard]] Result<cam::Program> understood_program(const ProgramFiles& files, cam::ReadOptions options,
