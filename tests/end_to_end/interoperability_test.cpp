@@ -1,5 +1,9 @@
 // A client of another maker's DDS, built from the same IDL, gets its answer.
+#include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include "server/dds/dds_service.h"
 #include "tests/dds/backend.h"
@@ -10,15 +14,40 @@ namespace {
 
 #ifdef TRAMMEL_CYCLONE_CLIENT
 
-/// The environment of a Cyclone DDS client that looks for a server at this port.
+/// The environment of a Cyclone DDS client that looks for a server at this port. Without an index it takes any free
+/// port: `auto` knows ten pairs of them in a domain of a host, which participants of other tests may have.
 std::string network(const DdsOptions& options) {
   return fmt::format(
       "CYCLONEDDS_URI=<CycloneDDS><Domain><General><Interfaces><NetworkInterface address=\"127.0.0.1\" "
       "multicast=\"false\"/></Interfaces><AllowMulticast>false</AllowMulticast></General><Discovery>"
-      "<ParticipantIndex>auto</ParticipantIndex><Peers><Peer address=\"127.0.0.1:{}\"/></Peers></Discovery></Domain>"
+      "<ParticipantIndex>none</ParticipantIndex><Peers><Peer address=\"127.0.0.1:{}\"/></Peers></Discovery></Domain>"
       "</CycloneDDS>",
       options.port);
 }
+
+/// Ports of the host, as long as it lives. One that somebody has already is taken, too.
+class TakenPorts {
+ public:
+  TakenPorts(int first, int count) {
+    for (int port = first; port < first + count; ++port) {
+      sockaddr_in at{};
+      at.sin_family = AF_INET;
+      at.sin_port = htons(static_cast<std::uint16_t>(port));
+      at.sin_addr.s_addr = htonl(INADDR_ANY);
+      const int held = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+      static_cast<void>(::bind(held, reinterpret_cast<const sockaddr*>(&at), sizeof at));
+      held_.push_back(held);
+    }
+  }
+  TakenPorts(const TakenPorts&) = delete;
+  TakenPorts& operator=(const TakenPorts&) = delete;
+  ~TakenPorts() {
+    for (const int held : held_) ::close(held);
+  }
+
+ private:
+  std::vector<int> held_;
+};
 
 class Interoperability : public testing::Test {
  protected:
@@ -55,6 +84,14 @@ TEST_F(Interoperability, ACycloneDdsClientThatIsStartedAgainIsAnsweredInTheParti
     const test::Finished client = run(TRAMMEL_CYCLONE_CLIENT, options_.domain, "5");
     EXPECT_EQ(client.exit_code, 0) << client.err;
   }
+}
+
+// With an index of `auto` it says "Failed to find a free participant index for domain 25".
+TEST_F(Interoperability, ACycloneDdsClientIsAnsweredBesideAsManyParticipantsAsADomainHasIndices) {
+  constexpr int kBase = 7400, kPerDomain = 250, kUnicast = 10, kPorts = 20;  // RTPS 2.3, 9.6.1.1
+  const TakenPorts others(kBase + kPerDomain * static_cast<int>(options_.domain) + kUnicast, kPorts);
+  const test::Finished client = run(TRAMMEL_CYCLONE_CLIENT, options_.domain, "20");
+  EXPECT_EQ(client.exit_code, 0) << client.err;
 }
 
 /// The same server where ROS 2 nodes are answered, too.

@@ -68,7 +68,7 @@ TEST_F(NetworkTest, ACycloneClientAsItsMakerShipsItIsAnsweredHoweverMuchItAsks) 
     const std::string uri = fmt::format(
         "CYCLONEDDS_URI=<CycloneDDS><Domain><General><Interfaces><NetworkInterface address=\"{}\" "
         "multicast=\"false\"/></Interfaces><AllowMulticast>false</AllowMulticast>{}</General><Discovery>"
-        "<ParticipantIndex>auto</ParticipantIndex><Peers><Peer address=\"{}:{}\"/></Peers></Discovery></Domain>"
+        "<ParticipantIndex>none</ParticipantIndex><Peers><Peer address=\"{}:{}\"/></Peers></Discovery></Domain>"
         "</CycloneDDS>",
         hosts_.address(1), sizes, hosts_.address(0), daemon_.port());
     for (const char* poses : {"100", "2000"}) {
