@@ -287,7 +287,7 @@ Gate::Gate(const GateDescriptor& descriptor)
       guard_(descriptor.options.dropped
                  ? std::make_unique<Guard>(
                        static_cast<std::uint32_t>(kMaxTextSample), descriptor.options.dropped, descriptor.relays,
-                       descriptor.options.secured,
+                       descriptor.options.proof,
                        descriptor.options.serves ? EndpointWatch::kMostOfClient : EndpointWatch::kMostOfServer)
                  : nullptr) {
   for (const Locator_t& host : descriptor.options.hosts) hosts_.push_back(socket_of(host));

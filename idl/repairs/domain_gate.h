@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "idl/repairs/guard/dropped.h"
+#include "idl/repairs/guard/proof.h"
 #include "server/base/mutex.h"
 
 /// Keeps DDS domains apart. Discovery here uses a fixed port in every domain, and Fast DDS 2.9 does not check the
@@ -74,7 +75,7 @@ struct GateOptions {
   std::shared_ptr<HeardOfItself> heard = {};  ///< may be null
   std::shared_ptr<DropCounts> dropped = {};   ///< null: there is no guard. For tests that show what it is for
   std::uint32_t largest_sent = UINT32_MAX;    ///< bytes of a datagram; others may send what `below` takes
-  bool secured = false;                       ///< participants prove who they are
+  Proof proof = Proof::kNone;                 ///< what participants prove
   bool serves = false;                        ///< others are clients: they have few endpoints
   std::shared_ptr<Hearing> hearing = {};      ///< what comes waits for it; null: it does not
   /// Where others are looked for: they are sent what they are sent, whoever else names them.

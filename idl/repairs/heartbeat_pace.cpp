@@ -22,6 +22,8 @@ std::optional<Lone> lone_submessage(Bytes message) {
   Bytes to, rest = message.subspan(kHeader);
   while (const auto submessage = next_submessage(rest)) {
     if (submessage->id == kInfoTimestamp || submessage->id == kStatistics) continue;
+    if (submessage->id == kSecureRtpsPrefix || submessage->id == kSecureRtpsPostfix) continue;  // around what is signed
+    if (submessage->id == kInfoSource) continue;
     if (submessage->id == kInfoDestination && submessage->body.size() >= kPrefix) {
       to = is_everybody(submessage->body) ? Bytes() : submessage->body.first(kPrefix);
       continue;

@@ -42,6 +42,8 @@ class OwnMessages {
     Bytes rest = message.subspan(kHeader);
     while (const auto submessage = next_submessage(rest)) {
       if (submessage->id == kInfoTimestamp || submessage->id == kStatistics) continue;
+      if (submessage->id == kSecureRtpsPrefix || submessage->id == kSecureRtpsPostfix) continue;  // around the rest
+      if (submessage->id == kInfoSource) continue;
       if (submessage->id != kInfoDestination) {
         if (!for_others) return true;
         continue;

@@ -250,11 +250,12 @@ Result<Security> read_security(const std::string& path) {
   TRY(check_certificate(folder, *certificate));
   TRY(check_key(folder, *certificate));
   const auto authority = TRY(folder.certificate("permissions_ca.cert.pem"));
-  TRY(signed_text(folder, "governance.p7s", *authority));
+  const auto governance = TRY(signed_text(folder, "governance.p7s", *authority));
   const auto permissions = TRY(signed_text(folder, "permissions.p7s", *authority));
   const std::string subject = subject_of(*certificate);
   TRY(check_permissions(folder, subject, permissions));
-  return Security{path, subject, role_in(permissions)};
+  const std::string kind = element(governance, "rtps_protection_kind");
+  return Security{path, subject, role_in(permissions), !kind.empty() && kind != "NONE"};
 }
 
 Status check_serves(const Security& security) {

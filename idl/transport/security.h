@@ -13,6 +13,7 @@ struct Security {
   std::string folder;
   std::string subject;  ///< of the certificate, as RFC 2253 writes it: `CN=line-3,O=Trammel`
   std::string role;     ///< that deploy/security/keys gave it; empty: its permissions are not from there
+  bool signs = false;  ///< by the plant's rules each message is signed, so that nobody else can speak for a participant
 };
 
 /// Looks at the files before the library does, which gives no reasons. Refuses (kRefused) a file that is missing or

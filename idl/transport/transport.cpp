@@ -83,7 +83,7 @@ void set_reader_times(dds::DataReaderQos& qos) {
 Result<ParticipantPtr> make_participant(const ParticipantOptions& options, dds::DomainParticipantListener* discovery) {
   const auto udp = TRY(udp_on(options.address));
   GateOptions gate{options.domain, options.heard_of_itself, options.dropped};
-  gate.secured = options.security.has_value();
+  if (options.security) gate.proof = options.security->signs ? Proof::kOfMessages : Proof::kOfIdentity;
   gate.serves = options.heard_of_itself != nullptr;
   gate.hearing = std::make_shared<Hearing>();
   for (const std::uint16_t port : options.peer_ports) gate.hosts.push_back(locator(options.address, port));

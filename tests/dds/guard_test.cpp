@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <numeric>
 #include <optional>
 #include <random>
@@ -388,12 +389,12 @@ TEST(Guard, WhoSaysByAKeyThatItHasGoneSaysItByAHash) {
     EXPECT_EQ(passed[kHeader + 1], kLittleEndian | kInlineQos);
   }
   EXPECT_EQ(fate(goodbye_by_key(kOther)), Dropped::kSource);
-  Guard secured(kMaxTextSample, nullptr, {}, true);
+  Guard secured(kMaxTextSample, nullptr, {}, Proof::kOfIdentity);
   EXPECT_EQ(kinds(let_in(secured, goodbye_by_key(kSource))), std::vector<int>{kPad});
 }
 
 TEST(Guard, WhereParticipantsProveWhoTheyAreNobodyIsSentAwayWithoutProof) {
-  Guard open(kMaxTextSample), secured(kMaxTextSample, nullptr, {}, true);
+  Guard open(kMaxTextSample), secured(kMaxTextSample, nullptr, {}, Proof::kOfIdentity);
   EXPECT_EQ(kinds(let_in(open, goodbye())), std::vector<int>{kData});
   EXPECT_EQ(kinds(let_in(secured, goodbye())), std::vector<int>{kPad});
   const PacketBytes of_writer = ParameterList().guid(0x0070, kSource, kUserWriter).add(0x0071, {0, 0, 0, 3}).bytes();
@@ -415,11 +416,13 @@ TEST(Guard, WhereParticipantsProveWhoTheyAreNobodyIsSentAwayWithoutProof) {
                  {}})
           .submessage(kSecureRtpsPostfix, 1, PacketBytes(20))
           .bytes();
-  EXPECT_EQ(let_in(secured, signed_one), signed_one) << "the library holds it against the key";
+  Guard all_signed(kMaxTextSample, nullptr, {}, Proof::kOfMessages);
+  EXPECT_EQ(let_in(all_signed, signed_one), signed_one) << "the library holds it against the key";
+  EXPECT_NE(let_in(secured, signed_one), signed_one) << "it has no keys for messages there";
 }
 
 TEST(Guard, WhereParticipantsProveWhoTheyAreNobodySaysSomethingElseOfThem) {
-  Guard open(kMaxTextSample), secured(kMaxTextSample, nullptr, {}, true);
+  Guard open(kMaxTextSample), secured(kMaxTextSample, nullptr, {}, Proof::kOfIdentity);
   for (Guard* guard : {&open, &secured}) {
     ASSERT_FALSE(let_in(*guard, announcement(participant(10).locator(0x0032, 5))).empty());
     speak(*guard);
@@ -429,6 +432,79 @@ TEST(Guard, WhereParticipantsProveWhoTheyAreNobodySaysSomethingElseOfThem) {
     EXPECT_EQ(kinds(let_in(secured, announcement(other))), std::vector<int>{kPad});
     EXPECT_EQ(kinds(let_in(open, announcement(other))), std::vector<int>{kData});
   }
+}
+
+/// `inner`, a message, as if it were signed.
+PacketBytes signed_message(const PacketBytes& inner, const PacketBytes& behind_prefix = {}) {
+  PacketBytes message = from().submessage(kSecureRtpsPrefix, 1, PacketBytes(20)).bytes();
+  test::put_bytes(message, behind_prefix);
+  test::put_bytes(message, PacketBytes(inner.begin() + kHeader, inner.end()));
+  test::put_bytes(message, {kSecureRtpsPostfix, 1, 20, 0});
+  test::put_bytes(message, PacketBytes(20));
+  return message;
+}
+
+TEST(Guard, WhereMessagesAreSignedNothingThatIsNotSpeaksForAnEndpointOfATopic) {
+  for (const PacketBytes& message :
+       {from().heartbeat(0, kUserWriter, 1000, 1000, 1).bytes(), from().gap(0, kUserWriter, 1, 1000).bytes(),
+        from().acknack(kUserReader, kUserWriter, 1000, 0, 1).bytes(),
+        from().data({0, kUserWriter, 1000, {}, kSample}).bytes(),
+        from().fragments({0, kUserWriter, 9, 1, 1, 1024, 4096, PacketBytes(1024)}).bytes()}) {
+    Guard open(kMaxTextSample), identified(kMaxTextSample, nullptr, {}, Proof::kOfIdentity),
+        all_signed(kMaxTextSample, nullptr, {}, Proof::kOfMessages);
+    EXPECT_EQ(let_in(open, message), message);
+    EXPECT_EQ(let_in(identified, message), message) << "its plant signs none";
+    EXPECT_EQ(kinds(let_in(all_signed, message)), std::vector<int>{kPad});
+    EXPECT_EQ(all_signed.counts().of(Dropped::kSecurity), 1u);
+    EXPECT_EQ(let_in(all_signed, signed_message(message)), signed_message(message));
+  }
+  const PacketBytes wrapped = from()
+                                  .submessage(kSecurePrefix, 1, PacketBytes(20))
+                                  .heartbeat(0, kUserWriter, 1000, 1000, 1)
+                                  .submessage(kSecurePostfix, 1, PacketBytes(20))
+                                  .bytes();
+  Guard beside(kMaxTextSample, nullptr, {}, Proof::kOfMessages);
+  EXPECT_NE(let_in(beside, wrapped), wrapped) << "endpoints of topics have no keys of their own";
+  Guard all_signed(kMaxTextSample, nullptr, {}, Proof::kOfMessages);
+  EXPECT_EQ(kinds(let_in(all_signed, announcement(participant()))), std::vector<int>{kData})
+      << "nobody can sign it yet";
+}
+
+TEST(Guard, WhereParticipantsProveWhoTheyAreEndpointsOfSecuritySayNothingInTheClear) {
+  constexpr std::uint32_t kSecurePublications = 0xff0003c2;
+  const PacketBytes plain = from().heartbeat(0, kSecurePublications, 1000, 1000, 1).bytes();
+  Guard open(kMaxTextSample), secured(kMaxTextSample, nullptr, {}, Proof::kOfIdentity);
+  EXPECT_EQ(let_in(open, plain), plain);
+  EXPECT_EQ(kinds(let_in(secured, plain)), std::vector<int>{kPad});
+  const PacketBytes wrapped = from()
+                                  .submessage(kSecurePrefix, 1, PacketBytes(20))
+                                  .heartbeat(0, kSecurePublications, 1000, 1000, 1)
+                                  .submessage(kSecurePostfix, 1, PacketBytes(20))
+                                  .bytes();
+  EXPECT_EQ(let_in(secured, wrapped), wrapped) << "the library holds it against the key";
+}
+
+TEST(Guard, WhatIsSignedIsNotChanged) {
+  Guard guard(kMaxTextSample, nullptr, {}, Proof::kOfMessages);
+  const auto skips = [&](std::int64_t first, std::uint32_t count) {
+    return signed_message(from().heartbeat(0, kUserWriter, first, first, count).bytes());
+  };
+  EXPECT_EQ(let_in(guard, skips(4'000'000, 1)), skips(4'000'000, 1));
+  EXPECT_EQ(fate(guard, skips(std::int64_t{1} << 40, 2)), Dropped::kSkipped);
+  EXPECT_EQ(fate(guard, signed_message(from().gap(0, kUserWriter, 1, std::int64_t{1} << 40).bytes())),
+            Dropped::kSkipped);
+}
+
+TEST(Guard, ASignedMessageMayRepeatItsHeaderAndNameNobodyElse) {
+  Guard guard(kMaxTextSample, nullptr, {}, Proof::kOfMessages);
+  const auto names = [](const Prefix& who) {
+    PacketBytes info = {kInfoSource, 1, 20, 0, 0, 0, 0, 0, 2, 3, 1, 15};
+    test::put_bytes(info, PacketBytes(who.begin(), who.end()));
+    return info;
+  };
+  const PacketBytes inner = from().heartbeat(0, kUserWriter, 1, 1, 1).bytes();
+  EXPECT_EQ(fate(guard, signed_message(inner, names(kSource))), kPasses);
+  EXPECT_EQ(fate(guard, signed_message(inner, names(kOther))), Dropped::kSource);
 }
 
 /// How a handshake by `speaker` begins, little endian.
@@ -698,6 +774,73 @@ TEST(Guard, WhatWasSentIsNotAskedForAgainWithoutEnd) {
     for (int i = 0; i < 10; ++i) all += passes(asks(who)) ? 1 : 0;
   }
   EXPECT_LT(all, 60) << "512 MB and half of what each may have";
+}
+
+/// How many numbers of an ACKNACK for kOther are left to be sent again; 0: it was dropped.
+int asked_for(Guard& guard, const PacketBytes& acknack, Guard::Time now) {
+  const auto passed = guard.check(acknack, kSocket, now);
+  if (!passed) return 0;
+  Reader reader(passed->subspan(kHeader + 16 + 4 + 16), true);
+  const std::uint32_t bits = reader.u32().value_or(0);
+  int count = 0;
+  for (std::uint32_t at = 0; at < bits; at += 32) count += std::popcount(reader.u32().value_or(0));
+  return count;
+}
+
+TEST(Guard, WhoMissesManySmallSamplesAfterALargeOneIsSentThemAgain) {
+  Guard guard(kMaxTextSample);
+  constexpr std::uint32_t kLarge = 30u << 20, kSize = 60000;
+  constexpr std::uint32_t kSmallOnes = 60;
+  guard.sent(Packet(kOther).fragments({0, kUserWriter, 7, 1, 1, kSize, kLarge, PacketBytes(kSize)}).bytes());
+  for (std::int64_t number = 8; number < 8 + kSmallOnes; ++number)
+    guard.sent(Packet(kOther).data({0, kUserWriter, number, {}, kSample}).bytes());
+  const Guard::Time now = std::chrono::steady_clock::now();
+  const Prefix one = known_inhabitant(guard, 1, now);
+  for (std::uint32_t count = 1; count <= 1000; ++count) {
+    const Packet asks = Packet(one).to(kOther).acknack(kUserReader, kUserWriter, 8, kSmallOnes, count);
+    ASSERT_EQ(asked_for(guard, asks.bytes(), now), static_cast<int>(kSmallOnes)) << count;
+  }
+  EXPECT_EQ(guard.counts().of(Dropped::kRepairs), 0u);
+  const Packet asks_for_large = Packet(one).to(kOther).acknack(kUserReader, kUserWriter, 7, 1, 1001);
+  EXPECT_EQ(asked_for(guard, asks_for_large.bytes(), now), 1);
+}
+
+TEST(Guard, WhoAsksForAllThatThereIsMakesTheServerSendNoMoreThanTheLimit) {
+  Guard guard(kMaxTextSample);
+  constexpr std::uint32_t kLarge = 30u << 20, kSize = 60000;
+  for (std::int64_t number = 1; number <= 64; ++number)
+    guard.sent(Packet(kOther).fragments({0, kUserWriter, number, 1, 1, kSize, kLarge, PacketBytes(kSize)}).bytes());
+  const Guard::Time begin = std::chrono::steady_clock::now();
+  const Prefix hostile = known_inhabitant(guard, 1, begin);
+  std::uint32_t count = 0;
+  double sent = 0;
+  for (std::chrono::milliseconds after{0}; after < std::chrono::seconds(60); after += std::chrono::milliseconds(50)) {
+    const Guard::Time now = begin + after;
+    const Packet all = Packet(hostile).to(kOther).acknack(kUserReader, kUserWriter, 1, 256, ++count);
+    sent += static_cast<double>(kLarge) * std::min(64, asked_for(guard, all.bytes(), now));
+    const Packet parts = Packet(hostile).to(kOther).nack_frag(kUserReader, kUserWriter, 64, 1, count);
+    if (guard.check(parts.bytes(), kSocket, now)) sent += kSize;
+    const double limit = RepairWatch::kAtOnce + RepairWatch::kPerSecond * std::chrono::duration<double>(after).count() +
+                         RepairWatch::kPerSecond * RepairWatch::kDebtSeconds;
+    ASSERT_LE(sent, limit) << "after " << after.count() << " ms";
+  }
+  EXPECT_GT(sent, 50 * RepairWatch::kPerSecond) << "and what is allowed it gets";
+}
+
+TEST(Guard, NobodyIsRefusedForLongerThanTwoSeconds) {
+  Guard guard(kMaxTextSample);
+  constexpr std::uint32_t kLarge = 32u << 20, kSize = 60000;
+  for (std::int64_t number = 1; number <= 64; ++number)
+    guard.sent(Packet(kOther).fragments({0, kUserWriter, number, 1, 1, kSize, kLarge, PacketBytes(kSize)}).bytes());
+  const Guard::Time now = std::chrono::steady_clock::now();
+  const Prefix one = known_inhabitant(guard, 1, now);
+  const auto asks = [&](std::uint32_t samples, std::uint32_t count, Guard::Time when) {
+    const Packet message = Packet(one).to(kOther).acknack(kUserReader, kUserWriter, 1, samples, count);
+    return asked_for(guard, message.bytes(), when);
+  };
+  EXPECT_EQ(asks(64, 1, now), 7) << "the first of them: 256 MB";
+  EXPECT_EQ(asks(64, 2, now), 0);
+  EXPECT_GE(asks(1, 3, now + std::chrono::milliseconds(2010)), 1);
 }
 
 TEST(Guard, OneSocketDoesNotInventParticipantsWithoutEnd) {

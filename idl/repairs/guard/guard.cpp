@@ -23,18 +23,19 @@ constexpr std::array<const char*, kDroppedReasons> kNames = {"no RTPS message", 
 
 const char* name_of(Dropped reason) { return kNames[static_cast<std::size_t>(reason)]; }
 
-Guard::Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts, std::vector<Relay> relays, bool secured,
+Guard::Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts, std::vector<Relay> relays, Proof proof,
              std::size_t most_endpoints)
     : largest_sample_(largest_sample),
       counts_(counts ? std::move(counts) : std::make_shared<DropCounts>()),
       relays_(std::move(relays)),
-      secured_(secured),
+      proof_(proof),
       memory_(most_endpoints) {}
 
 std::optional<Bytes> Guard::check(Bytes message, std::uint64_t socket, Time now) {
   EditedMessage edited(message);
   const bool relayed = is_of_relay(message, socket);
-  MessageCheck check({largest_sample_, socket, now, relayed, secured_}, memory_, message, edited);
+  MessageCheck check({largest_sample_, socket, now, relayed, proof_ != Proof::kNone, proof_ == Proof::kOfMessages},
+                     memory_, message, edited);
   if (const auto dropped = check.run()) {
     counts_->add(*dropped);
     return std::nullopt;
@@ -76,12 +77,16 @@ void Guard::sent(Bytes message) {
       if (!fragments || fragments->size == 0) continue;
       const MutexLock lock(memory_.mutex);
       memory_.sent.add(*fragments);
-      memory_.repairs.sent(fragments->writer, fragments->sample_size, std::chrono::steady_clock::now());
+      memory_.repairs.sent(fragments->writer, fragments->sequence_number, fragments->sample_size,
+                           std::chrono::steady_clock::now());
     } else if (submessage->id == kData) {
       Reader reader(submessage->body, submessage->little_endian());
       static_cast<void>(reader.take(8));  // flags, the reader
+      const auto writer = reader.entity();
+      const auto number = reader.sequence_number();
+      if (!writer || !number || *number < 1) continue;
       const MutexLock lock(memory_.mutex);
-      memory_.repairs.sent(reader.entity().value_or(0), submessage->body.size(), std::chrono::steady_clock::now());
+      memory_.repairs.sent(*writer, *number, submessage->body.size(), std::chrono::steady_clock::now());
     }
   }
 }

@@ -9,6 +9,7 @@
 
 #include "idl/repairs/guard/dropped.h"
 #include "idl/repairs/guard/guard_memory.h"
+#include "idl/repairs/guard/proof.h"
 #include "idl/repairs/guard/relay.h"
 #include "idl/repairs/guard/rtps_bytes.h"
 
@@ -24,10 +25,10 @@ class Guard {
 
   /// `largest_sample`: bytes that a sample of any topic may have.
   /// `relays` may announce others.
-  /// `secured`: participants prove who they are, so what is said without proof sends none of them away.
+  /// `proof`: what is said without the proof that all give sends none of them away and skips nothing of theirs.
   /// `most_endpoints`: of one participant.
   explicit Guard(std::uint32_t largest_sample, std::shared_ptr<DropCounts> counts = nullptr,
-                 std::vector<Relay> relays = {}, bool secured = false,
+                 std::vector<Relay> relays = {}, Proof proof = Proof::kNone,
                  std::size_t most_endpoints = EndpointWatch::kMostOfServer);
 
   /// What of a message that was received from `socket` (address and port) the library may see: all of it, as a rule.
@@ -50,7 +51,7 @@ class Guard {
   const std::uint32_t largest_sample_;
   const std::shared_ptr<DropCounts> counts_;
   const std::vector<Relay> relays_;
-  const bool secured_;
+  const Proof proof_;
   std::atomic<bool> knows_own_{false};
   GuardMemory memory_;
 };

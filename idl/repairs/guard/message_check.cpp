@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 
 #include "idl/repairs/guard/announcement_check.h"
 #include "idl/repairs/guard/cut_sample.h"
+#include "idl/repairs/guard/number_set.h"
 
 namespace trammel::wire {
 namespace {
@@ -14,8 +14,6 @@ constexpr std::uint32_t kPublications = 0x000003c2, kSubscriptions = 0x000004c2,
 constexpr std::uint32_t kSecureAnnouncer = 0xff0101c2, kSecurePublications = 0xff0003c2,
                         kSecureSubscriptions = 0xff0004c2, kSecureLiveliness = 0xff0200c2;
 constexpr std::uint32_t kHandshake = 0x000201c3, kHandshakeReader = 0x000201c4;
-constexpr std::uint32_t kBuiltIn = 0xc0;  // in the last octet of an entity id
-constexpr std::uint32_t kMostBits = 256;
 constexpr std::uint32_t kMostHistory = 1u << 24;  // samples that a HEARTBEAT may offer
 constexpr std::size_t kStatisticsBody = 56;       // a locator, a time, a sequence; as this library lays it out
 constexpr std::size_t kSmallestFragment = 64;     // the library keeps a list in the first octets of each
@@ -26,40 +24,6 @@ bool is_announcement_writer(std::uint32_t writer) {
          writer == kSecurePublications || writer == kSecureSubscriptions;
 }
 bool is_liveliness_writer(std::uint32_t writer) { return writer == kLiveliness || writer == kSecureLiveliness; }
-bool is_number(std::optional<std::int64_t> number) { return number && *number >= 1 && *number <= kLargestNumber; }
-
-/// A set of numbers behind its base.
-struct Set {
-  std::optional<Dropped> fault;
-  std::uint32_t bits = 0;
-  std::uint32_t highest = 0;  // from the base; 0 also when none is set
-  int count = 0;              // of those that are set
-};
-Set take_set(Reader& reader) {
-  const auto bits = reader.u32();
-  if (!bits) return {Dropped::kLength};
-  if (*bits > kMostBits) return {Dropped::kNumberSet};
-  Set set{{}, *bits};
-  for (std::uint32_t i = 0; i < (*bits + 31) / 32; ++i) {
-    const auto word = reader.u32();
-    if (!word) return {Dropped::kNumberSet};
-    const std::uint32_t used = *bits - 32 * i;  // of this word; the rest of it counts for nothing
-    const std::uint32_t set_bits = used >= 32 ? *word : *word & ~(UINT32_MAX >> used);
-    set.count += std::popcount(set_bits);
-    if (set_bits != 0) set.highest = 32 * i + 31 - static_cast<std::uint32_t>(std::countr_zero(set_bits));
-  }
-  return set;
-}
-
-struct Head {
-  std::uint32_t reader, writer;
-};
-std::optional<Head> take_head(Reader& reader) {
-  const auto to = reader.entity(), from = reader.entity();
-  if (!to || !from) return std::nullopt;
-  return Head{*to, *from};
-}
-
 }  // namespace
 
 std::optional<Fragments> fragments_of(const Submessage& submessage) {
@@ -101,6 +65,11 @@ std::optional<Dropped> MessageCheck::check_submessage(const Submessage& submessa
   const auto at_least = [&](std::size_t size) -> Fault {
     return submessage.body.size() < size ? Fault(Dropped::kLength) : Fault();
   };
+  if (lacks_proof(submessage)) {
+    blank(submessage);
+    left_out_ = Dropped::kSecurity;
+    return {};
+  }
   switch (submessage.id) {
     case kData:
       return received_.relayed ? check_relayed_data(submessage) : check_data(submessage);
@@ -121,15 +90,17 @@ std::optional<Dropped> MessageCheck::check_submessage(const Submessage& submessa
     case kInfoDestination:
       return check_destination(submessage);
     case kInfoSource:
-      return Dropped::kSource;
+      return signed_ && repeats_source(submessage.body) ? Fault() : Fault(Dropped::kSource);
     case kStatistics:
       return check_statistics(submessage, behind);
     case kSecureRtpsPrefix:
-      signed_ = true;
+      signed_ = received_.signs;  // elsewhere the library has no key for it
       return check_secured(submessage, behind);
-    case kSecureBody:
     case kSecurePrefix:
     case kSecurePostfix:
+      wrapped_ = submessage.id == kSecurePrefix;
+      return check_secured(submessage, behind);
+    case kSecureBody:
     case kSecureRtpsPostfix:
       return check_secured(submessage, behind);
     default:
@@ -224,6 +195,27 @@ void MessageCheck::make_gap(const Submessage& data, std::int64_t number) {
 /// Where participants prove who they are: whether a writer of announcements is one that anybody can speak for.
 bool MessageCheck::is_unproven(std::uint32_t writer) const {
   return received_.secured && !signed_ && (writer == kAnnouncer || writer == kPublications || writer == kSubscriptions);
+}
+
+/// Whether it speaks for an endpoint whose words are all proven, and proves nothing: anybody could have sent it, to
+/// make a reader skip what it has not read.
+bool MessageCheck::lacks_proof(const Submessage& submessage) const {
+  if (!received_.secured || signed_) return false;
+  const bool data = submessage.id == kData || submessage.id == kDataFrag;
+  const bool other = submessage.id == kHeartbeat || submessage.id == kHeartbeatFrag || submessage.id == kGap ||
+                     submessage.id == kAckNack || submessage.id == kNackFrag;
+  if (!data && !other) return false;
+  Reader reader(submessage.body, submessage.little_endian());
+  if (data && !reader.take(4)) return false;
+  const auto head = take_head(reader);
+  if (!head) return false;
+  const bool of_topic = (head->writer & kBuiltIn) != kBuiltIn;
+  return (is_of_security(head->writer) && !wrapped_) || (of_topic && received_.signs);
+}
+
+/// A message that is signed may begin with its header once more.
+bool MessageCheck::repeats_source(Bytes body) const {
+  return body.size() >= kPrefix && std::equal(source_.begin(), source_.end(), body.last(kPrefix).begin());
 }
 
 /// Said without proof, that a participant has gone, or one of its endpoints: its lease decides. Writers of endpoints'
@@ -373,8 +365,11 @@ std::optional<Dropped> MessageCheck::check_heartbeat(const Submessage& submessag
   if (*last - *first > kMostHistory) return Dropped::kNumber;
   const MutexLock lock(memory_.mutex);
   if (!memory_.sequences.count(key_of(source_, head->writer), *count, received_.now)) return Dropped::kCount;
-  const std::int64_t allowed = memory_.sequences.heartbeat(key_of(source_, head->writer), *first, received_.now);
-  if (allowed < *first) edited_.put_sequence_number(first_field.first(8), allowed, reader.little_endian());
+  const auto step = signed_ || wrapped_ ? SequenceWatch::kSignedStep : SequenceWatch::kHeartbeatStep;
+  const std::int64_t allowed = memory_.sequences.heartbeat(key_of(source_, head->writer), *first, step, received_.now);
+  if (allowed >= *first) return {};
+  if (signed_ || wrapped_) return Dropped::kSkipped;  // a signature does not outlive a change
+  edited_.put_sequence_number(first_field.first(8), allowed, reader.little_endian());
   return {};
 }
 
@@ -394,69 +389,16 @@ std::optional<Dropped> MessageCheck::check_gap(const Submessage& submessage) {
   const auto start = reader.sequence_number(), base = reader.sequence_number();
   if (!head || !start || !base) return Dropped::kLength;
   if (!is_number(start) || !is_number(base) || *base < *start) return Dropped::kNumber;
-  if (const Set set = take_set(reader); set.fault) return set.fault;
+  if (const NumberSet set = take_set(reader); set.fault) return set.fault;
   const MutexLock lock(memory_.mutex);
   const auto range = memory_.sequences.gap(key_of(source_, head->writer), {*start, *base}, received_.now);
   if (range.start == *start && range.end == *base) return {};
-  if (range.end <= range.start) return Dropped::kSkipped;
+  if (range.end <= range.start || signed_ || wrapped_) return Dropped::kSkipped;
   edited_.put_sequence_number(fields.first(8), range.start, reader.little_endian());
   if (range.end == *base) return {};
   edited_.put_sequence_number(fields.subspan(8, 8), range.end, reader.little_endian());
   edited_.put(fields.subspan(16, 4), std::uint32_t{0}, reader.little_endian());  // none beyond it
   return {};
-}
-
-/// The library sends nothing to those that it does not know.
-bool MessageCheck::may_be_repaired(double bytes) {
-  return !memory_.participants.is_there(source_, received_.now) ||
-         memory_.repairs.may_ask(source_, bytes, received_.now);
-}
-
-std::optional<Dropped> MessageCheck::check_acknack(const Submessage& submessage) {
-  constexpr std::uint32_t kAcks = 0x01000000;  // no entity kind: these count apart from HEARTBEATs
-  Reader reader(submessage.body, submessage.little_endian());
-  const auto head = take_head(reader);
-  const auto base = reader.sequence_number();
-  if (!head || !base) return Dropped::kLength;
-  if (*base < 0 || *base > kLargestNumber) return Dropped::kNumber;
-  const Set set = take_set(reader);
-  if (set.fault) return set.fault;
-  const auto count = reader.u32();
-  if (!count) return Dropped::kLength;
-  if (set.count > 0) {
-    const MutexLock lock(memory_.mutex);
-    const std::size_t each = memory_.repairs.sample_bytes(head->writer, received_.now);
-    if (!may_be_repaired(static_cast<double>(each) * set.count)) return Dropped::kRepairs;
-  }
-  return check_count(head->reader, head->writer ^ kAcks, *count);
-}
-
-std::optional<Dropped> MessageCheck::check_nack_frag(const Submessage& submessage) {
-  constexpr std::uint32_t kNacks = 0x02000000;
-  Reader reader(submessage.body, submessage.little_endian());
-  const auto head = take_head(reader);
-  const auto number = reader.sequence_number();
-  const auto base = reader.u32();
-  if (!head || !number || !base) return Dropped::kLength;
-  if (!is_number(number) || *base < 1) return Dropped::kNumber;
-  const Set set = take_set(reader);
-  if (set.fault) return set.fault;
-  const auto count = reader.u32();
-  if (!count) return Dropped::kLength;
-  if (std::uint64_t{*base} + kMostBits > UINT32_MAX) return Dropped::kNotSent;
-  {
-    const MutexLock lock(memory_.mutex);
-    const std::uint32_t each = memory_.sent.fragment_bytes(head->writer, *number, *base + set.highest);
-    if (each == 0) return Dropped::kNotSent;
-    if (!may_be_repaired(static_cast<double>(each) * set.count)) return Dropped::kRepairs;
-  }
-  return check_count(head->reader, head->writer ^ kNacks, *count);
-}
-
-std::optional<Dropped> MessageCheck::check_count(std::uint32_t endpoint, std::uint32_t tag, std::uint32_t count) {
-  const MutexLock lock(memory_.mutex);
-  const std::uint32_t mixed = endpoint * 0x9e3779b1u ^ tag;
-  return memory_.sequences.count(key_of(source_, mixed), count, received_.now) ? Fault() : Fault(Dropped::kCount);
 }
 
 std::optional<Dropped> MessageCheck::check_statistics(const Submessage& submessage, Bytes behind) {

@@ -10,6 +10,8 @@
 
 namespace trammel::wire {
 
+struct NumberSet;
+
 /// The fields of a DATA_FRAG; empty when it is too short.
 [[nodiscard]] std::optional<Fragments> fragments_of(const Submessage& submessage);
 
@@ -22,6 +24,7 @@ class MessageCheck {
     SequenceWatch::Time now{};
     bool relayed = false;  // a Relay sent it
     bool secured = false;  // participants prove who they are
+    bool signs = false;    // and that each message is theirs
   };
   MessageCheck(Circumstances received, GuardMemory& memory, Bytes message, EditedMessage& edited)
       : received_(received), memory_(memory), message_(message), edited_(edited) {}
@@ -44,7 +47,9 @@ class MessageCheck {
   [[nodiscard]] Bytes id_of(const Submessage& submessage) const;
   [[nodiscard]] Bytes flags_of(const Submessage& submessage) const;
   [[nodiscard]] bool is_unproven(std::uint32_t writer) const;
+  [[nodiscard]] bool lacks_proof(const Submessage& submessage) const;
   void ignore_end(std::uint32_t writer, const Submessage& data, std::int64_t number);
+  [[nodiscard]] bool repeats_source(Bytes body) const;
   Fault check_destination(const Submessage& submessage);
   Fault check_announced(const Submessage& submessage, std::uint32_t writer, std::int64_t number, Bytes payload);
   void check_endpoint(const Submessage& submessage, std::int64_t number, Reachable& reachable)
@@ -56,7 +61,7 @@ class MessageCheck {
   Fault check_heartbeat(const Submessage& submessage);
   Fault check_heartbeat_frag(const Submessage& submessage);
   Fault check_gap(const Submessage& submessage);
-  [[nodiscard]] bool may_be_repaired(double bytes) TRAMMEL_REQUIRES(memory_.mutex);
+  Fault check_repairs(std::uint32_t writer, std::int64_t base, const NumberSet& asked, bool little_endian);
   Fault check_acknack(const Submessage& submessage);
   Fault check_nack_frag(const Submessage& submessage);
   Fault check_statistics(const Submessage& submessage, Bytes behind);
@@ -67,9 +72,10 @@ class MessageCheck {
   GuardMemory& memory_;
   const Bytes message_;
   EditedMessage& edited_;
-  Bytes source_{};       // prefix
-  Bytes named_{};        // the prefix that announcements must name; empty: any
-  bool signed_ = false;  // the library holds the whole message against its sender's key
+  Bytes source_{};        // prefix
+  Bytes named_{};         // the prefix that announcements must name; empty: any
+  bool signed_ = false;   // the library holds the whole message against its sender's key
+  bool wrapped_ = false;  // and the submessage that is read against its endpoint's
   Fault left_out_{};
 };
 

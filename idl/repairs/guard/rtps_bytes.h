@@ -37,6 +37,11 @@ enum SubmessageId : unsigned char {
 
 inline constexpr unsigned char kLittleEndian = 0x01, kInlineQos = 0x02, kPayload = 0x04, kKey = 0x08;
 
+inline constexpr std::uint32_t kBuiltIn = 0xc0;  ///< in the last octet of an entity id: of discovery, no topic
+
+/// Whether an endpoint is one of those that DDS-Security adds, which say nothing in the clear.
+inline constexpr bool is_of_security(std::uint32_t entity) { return entity >> 24 == 0xff; }
+
 inline constexpr std::uint32_t kAnnouncer = 0x000100c2;  ///< writer of participants' announcements
 
 /// Reads from the front. Empty when too few bytes are left.

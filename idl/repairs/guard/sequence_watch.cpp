@@ -17,14 +17,14 @@ std::int64_t SequenceWatch::granted(std::int64_t wanted, std::int64_t step, std:
   return grant;
 }
 
-std::int64_t SequenceWatch::heartbeat(const EndpointKey& writer, std::int64_t first, Time now) {
+std::int64_t SequenceWatch::heartbeat(const EndpointKey& writer, std::int64_t first, std::int64_t step, Time now) {
   Known& known = known_.at(writer, now);
   const std::int64_t wanted = first - 1 - known.confirmed;
   if (wanted <= kFreely) return first;
-  const std::int64_t may = std::min(first - 1, known.confirmed + kHeartbeatStep);
+  const std::int64_t may = std::min(first - 1, known.confirmed + step);
   if (may > known.granted) {
     const std::int64_t from = std::max(known.granted, known.confirmed);
-    known.granted = from + granted(may - from, kHeartbeatStep, 1, now);
+    known.granted = from + granted(may - from, step, 1, now);
   }
   return std::min(may, known.granted) + 1;
 }

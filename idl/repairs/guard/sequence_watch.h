@@ -19,6 +19,8 @@ class SequenceWatch {
   static constexpr std::int64_t kFreely = 4096;  ///< numbers skipped without counting them
   /// Under half a second on a slow host: who stands still for longer than a lease takes himself for one that slept.
   static constexpr std::int64_t kHeartbeatStep = std::int64_t{1} << 20;
+  /// Of a signed message, which passes whole or not at all: what an honest writer skips at most when it is met again.
+  static constexpr std::int64_t kSignedStep = std::int64_t{1} << 22;
   static constexpr std::int64_t kGapStep = std::int64_t{1} << 17;
   static constexpr std::uint32_t kCountStep = 1u << 24;
 
@@ -26,8 +28,8 @@ class SequenceWatch {
   void confirmed(const EndpointKey& writer, std::int64_t number, Time now) {
     known_.at(writer, now).confirmed = number;
   }
-  /// What `first` of a HEARTBEAT may be at most.
-  [[nodiscard]] std::int64_t heartbeat(const EndpointKey& writer, std::int64_t first, Time now);
+  /// What `first` of a HEARTBEAT may be at most, in steps of so many numbers.
+  [[nodiscard]] std::int64_t heartbeat(const EndpointKey& writer, std::int64_t first, std::int64_t step, Time now);
   /// The part of GAP [start, end) that may pass; empty: none now.
   struct Range {
     std::int64_t start, end;

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <cstdint>
+
+namespace trammel::wire {
+
+/// What participants prove by DDS-Security.
+enum class Proof : std::uint8_t {
+  kNone,
+  kOfIdentity,  ///< who they are, and what they say of endpoints
+  kOfMessages   ///< also that each message is theirs
+};
+
+}  // namespace trammel::wire
