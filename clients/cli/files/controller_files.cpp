@@ -135,8 +135,8 @@ Result<cam::SourceFile> read_listing(const std::string& path, cam::Dialect diale
   const std::vector<const char*> wanted = own == cam::Dialect::kInform
                                               ? std::vector<const char*>{"//TOOL ", "BUSER"}
                                               : std::vector<const char*>{"$MNUFRAME", "$MNUTOOL"};
-  const bool any = std::any_of(wanted.begin(), wanted.end(),
-                               [&](const char* word) { return text.find(word) != std::string::npos; });
+  const bool any =
+      std::any_of(wanted.begin(), wanted.end(), [&](const char* word) { return text.find(word) != std::string::npos; });
   if (!any)
     return refused("no frames or tools in it, expected {}", fmt::format("{}", fmt::join(wanted, " or ")))
         .in(path)
