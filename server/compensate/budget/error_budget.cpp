@@ -8,6 +8,7 @@
 #include "server/base/shown_value.h"
 #include "server/base/units.h"
 #include "server/compensate/budget/effects.h"
+#include "server/compensate/budget/remedies.h"
 #include "server/compensate/budget/usual.h"
 #include "server/error_sources/catalogue.h"
 #include "server/measurement/gauges.h"
