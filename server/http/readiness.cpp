@@ -37,6 +37,8 @@ State state_of(const CellTrouble& trouble) {
       return State::kOlderServed;
     case CellTrouble::Kind::kSetApart:
       return State::kDescribedOtherwise;
+    case CellTrouble::Kind::kFormerFiles:
+      return State::kFormerServed;
     case CellTrouble::Kind::kCopyServed:
       return State::kCopyServed;
   }
@@ -74,6 +76,9 @@ CellReadiness readiness_of(const std::string& cell, const Known& known, const Wa
     }
     return one;
   }
+  const bool has_other_files = trouble != known.troubles.end() && state_of(trouble->second) == State::kFormerServed;
+  if (has_other_files)
+    return {cell, State::kDescribedOtherwise, 0, trouble->second.what};  // and no model to go on with
   if (trouble != known.troubles.end()) return {cell, state_of(trouble->second), 0, trouble->second.what};
   if (const auto job = known.unfinished.find(cell); job != known.unfinished.end())
     return {cell, State::kInTraining, 0, fmt::format("job {} is making its first model", job->second.job)};
@@ -150,6 +155,8 @@ const char* to_text(CellReadiness::State state) {
       return "on_disk";
     case State::kCopyServed:
       return "copy_served";
+    case State::kFormerServed:
+      return "former_files";
     case State::kOlderServed:
       return "older_served";
     case State::kLoading:

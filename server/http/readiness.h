@@ -14,6 +14,7 @@ struct CellReadiness {
     kServed,
     kOnDisk,         ///< served; its model is loaded when it is asked for
     kCopyServed,     ///< served, from the copy of a model whose text in the store is bad
+    kFormerServed,   ///< served, by files of the cell that the record no longer goes by
     kOlderServed,    ///< served, with an older version than the one in force
     kLoading,        ///< dark: its model is not loaded yet
     kUntrained,      ///< dark: there is no model

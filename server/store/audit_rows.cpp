@@ -35,6 +35,31 @@ AuditRow row_of(Rows& row) {
 
 namespace {
 
+/// The row before is looked at in the same statement: of a store that was moved services know only when they connect.
+constexpr const char* kAppend =
+    "INSERT INTO audit (number, at, who, cell, what, subject, before, after, why, request, hash_before, hash, server) "
+    "SELECT CAST($1 AS BIGINT), CAST($2 AS BIGINT), $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13 "
+    "WHERE $5 = 'reopen' OR NOT EXISTS (SELECT 1 FROM audit WHERE number = $1 - 1 AND what = 'moved')";
+
+/// False: the store was moved elsewhere. Where everybody waits for the end of the trail, one statement does it all, and
+/// tells the others; however often a transaction tells them, they hear it once.
+bool is_added(Database& database, const AuditRow& row) {
+  const auto with_row = [&](const auto& run) {
+    return run(row.number, row.at, row.who, row.cell, row.what, row.subject, row.before, row.after, row.why,
+               row.request, row.hash_before, row.hash, row.server);
+  };
+  if (database.is_shared()) {
+    const std::string at_once = fmt::format(
+        "WITH added AS ({} RETURNING number, hash) UPDATE audit_end SET rows = added.number, hash = added.hash "
+        "FROM added RETURNING pg_notify('{}', '')",
+        kAppend, kChangesChannel);
+    return with_row([&](const auto&... values) { return exists(database, at_once.c_str(), values...); });
+  }
+  if (with_row([&](const auto&... values) { return change(database, kAppend, values...); }) == 0) return false;
+  change(database, "UPDATE audit_end SET rows = $1, hash = $2", row.number, row.hash);
+  return true;
+}
+
 void append(Database& database, const AuditEntry& entry, const ChangeId& by) {
   const End end = end_of(database, locked(database, kEnd));
   AuditRow row{
@@ -42,19 +67,8 @@ void append(Database& database, const AuditEntry& entry, const ChangeId& by) {
       entry.before,     entry.after, entry.why.empty() ? by.reason : entry.why, by.id,      end.hash,   {},
       database.writer()};
   row.hash = hash_of(row);
-  // The row before is looked at in the same statement: of a store that was moved services know only when they connect.
-  const int added =
-      change(database,
-             "INSERT INTO audit (number, at, who, cell, what, subject, before, after, why, request, hash_before, hash, "
-             "server) "
-             "SELECT CAST($1 AS BIGINT), CAST($2 AS BIGINT), $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13 "
-             "WHERE $5 = 'reopen' OR NOT EXISTS (SELECT 1 FROM audit WHERE number = $1 - 1 AND what = 'moved')",
-             row.number, row.at, row.who, row.cell, row.what, row.subject, row.before, row.after, row.why, row.request,
-             row.hash_before, row.hash, row.server);
-  if (added == 0) throw DatabaseError(DatabaseError::Kind::kAway, "was moved elsewhere: its audit trail says where to");
-  change(database, "UPDATE audit_end SET rows = $1, hash = $2", row.number, row.hash);
-  // However often a transaction says it, others hear it once.
-  if (database.is_shared()) static_cast<void>(exists(database, "SELECT pg_notify($1, '')", kChangesChannel));
+  if (!is_added(database, row))
+    throw DatabaseError(DatabaseError::Kind::kAway, "was moved elsewhere: its audit trail says where to");
 }
 
 }  // namespace

@@ -56,6 +56,52 @@ std::string spoken(const std::string& quarantine) {
   return quarantine.empty() ? "free" : "in quarantine: " + quarantine;
 }
 
+/// The job, the batch and what the job takes, or the job and the hash of a batch that was there before. In a database
+/// to which each statement is a way and back, this is one. The cell is locked: nobody else adds the batch meanwhile.
+constexpr const char* kAddAtOnce =
+    "WITH present AS (SELECT hash, job FROM batches WHERE cell = $1 AND id = $2), "
+    "made AS (INSERT INTO jobs (cell, level, bias, state, message, created_at, kind) "
+    "SELECT $1, $3, $4, 'queued', $5, CAST($6 AS BIGINT), $7 WHERE NOT EXISTS (SELECT 1 FROM present) RETURNING id), "
+    "kept AS (INSERT INTO batches (cell, id, csv, hash, request_id, accepted_at, poses, job) "
+    "SELECT $1, $2, CAST($8 AS BYTEA), $9, $10, CAST($11 AS BIGINT), CAST($12 AS BIGINT), id FROM made), "
+    "listed AS (INSERT INTO job_batches (job, position, cell, batch) SELECT id, 0, $1, $2 FROM made) "
+    "SELECT id, FALSE, '' FROM made UNION ALL SELECT job, TRUE, hash FROM present";
+
+/// A batch that is stored, or was before.
+struct KeptBatch {
+  std::int64_t job = 0;
+  bool was_there = false;
+  std::string hash = {};  ///< of the one that was there
+};
+
+KeptBatch keep_at_once(Database& database, const StoredBatch& batch, const StoredJob& job) {
+  auto row = prepare(database, kAddAtOnce, batch.cell, batch.id, job.level, job.bias, job.message, job.created_at,
+                     stored_kind(job.kind), batch.csv, batch.hash, batch.request_id, batch.accepted_at, batch.poses);
+  if (!row.next()) throw DatabaseError(DatabaseError::Kind::kAgain, "the batch is neither there nor was it stored");
+  return {row.integer64(0), row.truth(1), row.text(2)};
+}
+
+KeptBatch keep(Database& database, const StoredBatch& batch, const StoredJob& job) {
+  if (database.is_shared()) return keep_at_once(database, batch, job);
+  auto present = prepare(database, "SELECT hash, job FROM batches WHERE cell = $1 AND id = $2", batch.cell, batch.id);
+  if (present.next()) return {present.integer64(1), true, present.text(0)};
+  const std::int64_t id = insert_job(database, job);
+  change(database,
+         "INSERT INTO batches (cell, id, csv, hash, request_id, accepted_at, poses, job) "
+         "VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
+         batch.cell, batch.id, batch.csv, batch.hash, batch.request_id, batch.accepted_at, batch.poses, id);
+  insert_job_batches(database, id, batch.cell, {batch.id});
+  return {id};
+}
+
+/// The job as it was queued with its batch just now.
+StoredJob queued_with(const StoredBatch& batch, StoredJob job, std::int64_t id) {
+  job.id = id;
+  job.batch_ids = {batch.id};
+  job.state = JobState::kQueued;
+  return job;
+}
+
 Failure other_content(const StoredBatch& batch, std::int64_t job) {
   return failure(ErrorCode::kConflict, "cell {} already has a batch {} with other content (job {})", batch.cell,
                  batch.id, job)
@@ -72,28 +118,19 @@ Failure discarded_failure(const std::string& cell, const std::string& id) {
       .next("submit it again under another id if it is good");
 }
 
-Result<StoredJob> Store::add_batch(const StoredBatch& batch, const StoredJob& job) {
-  return connection_->in_transaction([&](Database& database) -> Result<StoredJob> {
+Result<AcceptedJob> Store::add_batch(const StoredBatch& batch, const StoredJob& job) {
+  return connection_->in_transaction([&](Database& database) -> Result<AcceptedJob> {
     lock_cell(database, batch.cell);
-    auto present = prepare(database, "SELECT hash, job FROM batches WHERE cell = $1 AND id = $2", batch.cell, batch.id);
-    if (present.next()) {
-      const bool same_content = present.text(0) == batch.hash;
-      const std::int64_t made = present.integer64(1);
-      // A repeat, or a client that lost its receipt.
-      if (same_content) return read_job(database, made);
-      return other_content(batch, made);
-    }
-    const std::int64_t id = insert_job(database, job);
-    change(database,
-           "INSERT INTO batches (cell, id, csv, hash, request_id, accepted_at, poses, job) "
-           "VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
-           batch.cell, batch.id, batch.csv, batch.hash, batch.request_id, batch.accepted_at, batch.poses, id);
-    insert_job_batches(database, id, batch.cell, {batch.id});
+    const KeptBatch kept = keep(database, batch, job);
+    if (kept.was_there && kept.hash != batch.hash) return other_content(batch, kept.job);
+    // A repeat, or a client that lost its receipt.
+    if (kept.was_there)
+      return read_job(database, kept.job).map([](StoredJob made) { return AcceptedJob{std::move(made), true}; });
     record_audit(database,
                  {batch.cell, "batch", "batch " + batch.id, "",
-                  fmt::format("{} poses, sha256 {}, job {}", batch.poses, batch.hash, id)},
+                  fmt::format("{} poses, sha256 {}, job {}", batch.poses, batch.hash, kept.job)},
                  {batch.request_id, "", batch.who});
-    return read_job(database, id);
+    return AcceptedJob{queued_with(batch, job, kept.job), false};
   });
 }
 

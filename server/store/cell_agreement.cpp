@@ -30,31 +30,41 @@ bool describes_so(const ServerInRecord& server, const std::string& cell, const C
   return server.self.cells.at(cell).files == files;
 }
 
+/// `was_so`: its files were those of the record since it began.
 std::string why_not(const std::string& cell, const std::string& me, const DescribedCell& known,
-                    const CellDescription& mine, const std::vector<const ServerInRecord*>& having) {
+                    const CellDescription& mine, const std::vector<const ServerInRecord*>& having, bool was_so) {
   const auto holder = std::find_if(having.begin(), having.end(),
                                    [&](const ServerInRecord* one) { return describes_so(*one, cell, known.files); });
   const std::string whose = holder != having.end()
                                 ? fmt::format("than {} (on {})", (*holder)->self.server, (*holder)->self.host)
                                 : fmt::format("than {} had", known.server == me ? "it" : known.server);
-  return fmt::format(
-      "cell {0}: {1} has another {2} {3}, by which the record goes: {1} does not serve it until they agree "
-      "(trammel store describe says whose counts)",
-      cell, me, what_differs(known.files, mine), whose);
+  const std::string has = fmt::format("cell {}: {} has another {} {}, by which the record goes", cell, me,
+                                      what_differs(known.files, mine), whose);
+  if (was_so)
+    return fmt::format(
+        "{} now: until it is started with the same one, {} answers with the model that it has, and "
+        "changes nothing",
+        has, me);
+  return fmt::format("{}: {} does not serve it until they agree (trammel store describe says whose counts)", has, me);
 }
 
 /// What this server says of cells against what the record goes by.
 class Comparison {
  public:
-  Comparison(Database& database, const Worker& worker, bool starts)
-      : database_(database), worker_(worker), starts_(starts), others_(server_rows(database, true, worker.token)) {}
+  Comparison(Database& database, const Worker& worker, bool starts, const std::set<std::string>& agreed)
+      : database_(database),
+        worker_(worker),
+        starts_(starts),
+        agreed_(agreed),
+        others_(server_rows(database, true, worker.token)) {}
 
   void compare(const std::string& cell, const CellDescription& mine) {
     lock_cell(database_, cell);
     const auto known = cell_description(database_, cell);
     if (known && known->files == mine) return;
-    if (known && !may_change(cell, *known, mine)) {
-      disputes_[cell] = why_not(cell, worker_.server, *known, mine, who_has(others_, cell));
+    const bool was_so = agreed_.contains(cell);  // what was given up since is not wanted back by who has it still
+    if (known && (was_so || !may_change(cell, *known, mine))) {
+      disputes_[cell] = why_not(cell, worker_.server, *known, mine, who_has(others_, cell), was_so);
       return;
     }
     add_cell_description(database_, cell, mine, worker_.server);
@@ -79,13 +89,18 @@ class Comparison {
                                 const CellDescription& mine) const {
     const auto having = who_has(others_, cell);
     if (having.empty()) return starts_ && known.server == worker_.server;
-    return std::all_of(having.begin(), having.end(),
-                       [&](const ServerInRecord* one) { return describes_so(*one, cell, mine); });
+    const auto wants = std::count_if(having.begin(), having.end(), [&](const ServerInRecord* one) {
+      return describes_so(*one, cell, mine) && one->self.cells.at(cell).is_apart;
+    });
+    const auto others = std::count_if(having.begin(), having.end(),
+                                      [&](const ServerInRecord* one) { return !describes_so(*one, cell, mine); });
+    return wants > 0 && wants + 1 > others;
   }
 
   Database& database_;
   const Worker& worker_;
   const bool starts_;
+  const std::set<std::string>& agreed_;
   const std::vector<ServerInRecord> others_;
   std::vector<std::string> first_;
   Disputes disputes_;
@@ -125,7 +140,16 @@ Result<std::int64_t> Store::descriptions_made() const {
   });
 }
 
-Result<Disputes> Store::agree_on_cells(const Mine& mine, bool starts) {
+Result<RecordCounts> Store::counts() const {
+  return connection_->exclusively([](Database& database) -> Result<RecordCounts> {
+    auto row = prepare(database,
+                       "SELECT (SELECT rows FROM audit_end), (SELECT COALESCE(MAX(number), 0) FROM cell_descriptions)");
+    if (!row.next()) return RecordCounts{};
+    return RecordCounts{row.integer64(0), row.integer64(1)};
+  });
+}
+
+Result<Disputes> Store::agree_on_cells(const Mine& mine, bool starts, const std::set<std::string>& agreed) {
   if (!is_shared()) return Disputes();
   const auto differing = TRY(connection_->exclusively([&](Database& database) -> Result<Mine> {
     Mine all;
@@ -138,7 +162,7 @@ Result<Disputes> Store::agree_on_cells(const Mine& mine, bool starts) {
   }));
   if (differing.empty()) return Disputes();
   return connection_->in_transaction([&](Database& database) -> Result<Disputes> {
-    Comparison comparison(database, connection_->worker, starts);
+    Comparison comparison(database, connection_->worker, starts, agreed);
     for (const auto& [cell, files] : differing) comparison.compare(cell, files);
     return comparison.end();
   });

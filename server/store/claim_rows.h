@@ -20,8 +20,16 @@ struct Worker {
   std::string token;   ///< of this start of it: what a start before claimed is not its own
 };
 
-/// Times of claims and servers are the database's: servers have clocks of their own. Unix time, s.
+/// Times of claims and servers are the database's: servers have clocks of their own. Unix time, s. As an expression,
+/// where it is to be of the statement itself.
+[[nodiscard]] const char* now_in(const Database& database);
 [[nodiscard]] std::int64_t now_of(Database& database);
+
+/// For the RETURNING of what is written again soon: the commit then waits neither for the disk nor for a standby.
+[[nodiscard]] const char* unwaited_for(const Database& database);
+
+/// Servers hear at the end of the transaction that there may be something to do: at once, and not by looking.
+void tell_others(Database& database);
 
 /// Has a token of its own, and no name.
 [[nodiscard]] Worker new_worker();

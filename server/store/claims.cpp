@@ -37,20 +37,31 @@ Failure held_elsewhere(ErrorCode code, std::int64_t job, const std::string& serv
 /// Refuses where another server that is believed to live works on the job, or on another one of its cell.
 Status check_free(Database& database, const Worker& worker, const std::string& cell) {
   if (!database.is_shared()) return {};
-  const std::int64_t now = now_of(database);
-  auto rows = prepare(database,
-                      "SELECT job, server FROM job_claims JOIN jobs ON jobs.id = job_claims.job "
-                      "WHERE jobs.cell = $1 AND jobs.state = 'running' AND token <> $2 AND lease_until > $3",
-                      cell, worker.token, now);
+  const std::string others = fmt::format(
+      "SELECT job, server FROM job_claims JOIN jobs ON jobs.id = job_claims.job "
+      "WHERE jobs.cell = $1 AND jobs.state = 'running' AND token <> $2 AND lease_until > {}",
+      now_in(database));
+  auto rows = prepare(database, others.c_str(), cell, worker.token);
   if (!rows.next()) return {};
   return held_elsewhere(ErrorCode::kConflict, rows.integer64(0), rows.text(1));
 }
 
 }  // namespace
 
+const char* now_in(const Database& database) {
+  return database.is_shared() ? "CAST(EXTRACT(EPOCH FROM clock_timestamp()) AS bigint)" : "unixepoch()";
+}
+
 std::int64_t now_of(Database& database) {
-  return integer_of(database, database.is_shared() ? "SELECT CAST(EXTRACT(EPOCH FROM clock_timestamp()) AS bigint)"
-                                                   : "SELECT unixepoch()");
+  return integer_of(database, fmt::format("SELECT {}", now_in(database)).c_str());
+}
+
+const char* unwaited_for(const Database& database) {
+  return database.is_shared() ? "set_config('synchronous_commit', 'off', TRUE)" : "1";
+}
+
+void tell_others(Database& database) {
+  if (database.is_shared()) static_cast<void>(exists(database, "SELECT pg_notify($1, '')", kChangesChannel));
 }
 
 Worker new_worker() {
@@ -79,11 +90,12 @@ Status claim_job(Database& database, const Worker& worker, std::int64_t job) {
       job);
   if (begun != 1)
     return failure(ErrorCode::kNotFound, "job {} does not exist or is finished", job).of("job").with_value(job);
-  change(database,
-         "INSERT INTO job_claims (job, server, token, lease_until, cancelled_by) VALUES ($1, $2, $3, $4, NULL) "
-         "ON CONFLICT (job) DO UPDATE SET server = excluded.server, token = excluded.token, "
-         "lease_until = excluded.lease_until",
-         job, worker.server, worker.token, now_of(database) + kLease.count());
+  const std::string claim = fmt::format(
+      "INSERT INTO job_claims (job, server, token, lease_until, cancelled_by) VALUES ($1, $2, $3, {} + {}, NULL) "
+      "ON CONFLICT (job) DO UPDATE SET server = excluded.server, token = excluded.token, "
+      "lease_until = excluded.lease_until",
+      now_in(database), kLease.count());
+  change(database, claim.c_str(), job, worker.server, worker.token);
   return {};
 }
 
@@ -97,9 +109,10 @@ void Store::wait_for_change(const std::stop_token& stop, std::chrono::millisecon
 
 Result<ClaimState> Store::renew_claim(std::int64_t job) {
   return connection_->urgently([&](Database& database) -> Result<ClaimState> {
-    auto row =
-        prepare(database, "UPDATE job_claims SET lease_until = $1 WHERE job = $2 AND token = $3 RETURNING cancelled_by",
-                now_of(database) + kLease.count(), job, connection_->worker.token);
+    const std::string renew = fmt::format(
+        "UPDATE job_claims SET lease_until = {} + {} WHERE job = $1 AND token = $2 RETURNING cancelled_by, {}",
+        now_in(database), kLease.count(), unwaited_for(database));
+    auto row = prepare(database, renew.c_str(), job, connection_->worker.token);
     ClaimState state;
     state.is_held = row.next();
     if (state.is_held && !row.is_null(0)) state.cancelled_by = row.text(0);
@@ -119,7 +132,7 @@ Result<CancelledJob> Store::cancel_job(std::int64_t job, const JobOutcome& outco
                        job, now_of(database));
     // Nobody works on it, or nobody who lives.
     if (heard == 0) static_cast<void>(fail_job(database, job, outcome.why, outcome, by));
-    if (database.is_shared()) static_cast<void>(exists(database, "SELECT pg_notify($1, '')", kChangesChannel));
+    tell_others(database);
     return ChangeOutcome{0, job};
   };
   return connection_->in_transaction([&](Database& database) -> Result<CancelledJob> {
@@ -129,17 +142,18 @@ Result<CancelledJob> Store::cancel_job(std::int64_t job, const JobOutcome& outco
   });
 }
 
-Result<std::set<std::int64_t>> Store::jobs_to_take() const {
-  return connection_->exclusively([&](Database& database) -> Result<std::set<std::int64_t>> {
+Result<std::map<std::int64_t, std::string>> Store::jobs_to_take() const {
+  return connection_->exclusively([&](Database& database) -> Result<std::map<std::int64_t, std::string>> {
     // The few that are worked on are looked for once, and not for each that waits.
-    constexpr const char* kToTake =
+    const std::string to_take = fmt::format(
         "WITH alive AS (SELECT id, cell, token FROM jobs JOIN job_claims ON job = id "
-        "WHERE state = 'running' AND lease_until > $1) "
-        "SELECT id FROM jobs WHERE state IN ('queued', 'running') AND id NOT IN (SELECT id FROM alive) "
-        "AND cell NOT IN (SELECT cell FROM alive WHERE token <> $2)";
-    auto rows = prepare(database, kToTake, now_of(database), connection_->worker.token);
-    std::set<std::int64_t> jobs;
-    while (rows.next()) jobs.insert(rows.integer64(0));
+        "WHERE state = 'running' AND lease_until > {}) "
+        "SELECT id, cell FROM jobs WHERE state IN ('queued', 'running') AND id NOT IN (SELECT id FROM alive) "
+        "AND cell NOT IN (SELECT cell FROM alive WHERE token <> $1)",
+        now_in(database));
+    auto rows = prepare(database, to_take.c_str(), connection_->worker.token);
+    std::map<std::int64_t, std::string> jobs;
+    while (rows.next()) jobs.emplace(rows.integer64(0), rows.text(1));
     return jobs;
   });
 }

@@ -68,6 +68,7 @@ class StoreConnection {
   const std::unique_ptr<ServedCopies> copies;
   Worker worker = new_worker();  ///< its name is set before there are jobs
   std::string told_cells;        ///< what the last heartbeat said of them; of the one thread that has it
+  bool has_told = false;         ///< that it is there; likewise
   mutable Mutex state_mutex;     // taken last, and for moments only
   Condition state_changed;
   StoreState state_now TRAMMEL_GUARDED_BY(state_mutex);

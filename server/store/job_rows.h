@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,12 @@
 
 /// Jobs as rows, for the transactions of batches, jobs and models.
 namespace trammel {
+
+/// Jobs are told apart from batches by their numbers, which need not be bound: `1, 2, 3`.
+[[nodiscard]] std::string list_of(const std::set<std::int64_t>& ids);
+
+/// As the table of jobs holds it, whose CHECK is of before there were checks: those stand in health_checks, too.
+[[nodiscard]] const char* stored_kind(JobKind kind);
 
 /// Queues the job; its batches are not written yet.
 [[nodiscard]] std::int64_t insert_job(Database& database, const StoredJob& job);

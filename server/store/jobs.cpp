@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <map>
+#include <set>
 #include <string_view>
 #include <utility>
 
@@ -76,14 +78,12 @@ JobOutcome outcome_of(Rows& row) {
   return outcome;
 }
 
-/// As the table of jobs holds it, whose CHECK is of before there were checks: those stand in health_checks, too.
-const char* stored_kind(JobKind kind) { return kind == JobKind::kTrain ? "train" : "diagnose"; }
-
 JobKind job_kind_of(const std::string& text) {
   return text == "diagnose" ? JobKind::kDiagnose : text == "check" ? JobKind::kCheck : JobKind::kTrain;
 }
 
-StoredJob job_of(Database& database, Rows& row) {
+/// The job in a row of kJobColumns, without its batches.
+StoredJob job_of(Rows& row) {
   StoredJob job;
   job.id = row.integer64(0);
   job.cell = row.text(1);
@@ -99,13 +99,28 @@ StoredJob job_of(Database& database, Rows& row) {
   job.finished_at = optional_integer(row, 11);
   job.outcome = outcome_of(row);
   if (job.state != JobState::kQueued) job.server = row.text(21);
-  job.batch_ids = batches_of(database, job.id);
   return job;
+}
+
+/// By one statement for all of them.
+void add_batch_ids(Database& database, std::vector<StoredJob>& jobs) {
+  std::map<std::int64_t, StoredJob*> by_id;
+  std::set<std::int64_t> ids;
+  for (StoredJob& job : jobs) {
+    by_id[job.id] = &job;
+    ids.insert(job.id);
+  }
+  if (ids.empty()) return;
+  const std::string wanted =
+      fmt::format("SELECT job, batch FROM job_batches WHERE job IN ({}) ORDER BY job, position", list_of(ids));
+  auto rows = prepare(database, wanted.c_str());
+  while (rows.next()) by_id.at(rows.integer64(0))->batch_ids.push_back(rows.text(1));
 }
 
 std::vector<StoredJob> jobs_of(Database& database, Rows rows) {
   std::vector<StoredJob> jobs;
-  while (rows.next()) jobs.push_back(job_of(database, rows));
+  while (rows.next()) jobs.push_back(job_of(rows));
+  add_batch_ids(database, jobs);
   return jobs;
 }
 
@@ -138,6 +153,10 @@ void record_end(Database& database, std::int64_t job, const JobOutcome& outcome)
 
 }  // namespace
 
+std::string list_of(const std::set<std::int64_t>& ids) { return fmt::format("{}", fmt::join(ids, ", ")); }
+
+const char* stored_kind(JobKind kind) { return kind == JobKind::kTrain ? "train" : "diagnose"; }
+
 std::int64_t insert_job(Database& database, const StoredJob& job) {
   Rows made = prepare(
       database,
@@ -166,7 +185,9 @@ std::string cell_of_job(Database& database, std::int64_t job) {
 Result<StoredJob> read_job(Database& database, std::int64_t id) {
   auto row = prepare(database, (std::string(kJobColumns) + "WHERE id = $1").c_str(), id);
   if (!row.next()) return failure(ErrorCode::kNotFound, "job {} does not exist", id).of("job").with_value(id);
-  return job_of(database, row);
+  StoredJob job = job_of(row);
+  job.batch_ids = batches_of(database, id);
+  return job;
 }
 
 Status end_job(Database& database, const Worker& worker, std::int64_t id, const std::string& cell, int model_version,
@@ -339,9 +360,33 @@ Result<StoredJob> Store::job(std::int64_t id) const {
   return connection_->exclusively([&](Database& database) { return read_job(database, id); });
 }
 
-Result<std::vector<StoredJob>> Store::unfinished_jobs() const {
+Result<std::vector<StoredJob>> Store::jobs(const std::set<std::int64_t>& ids) const {
+  if (ids.empty()) return std::vector<StoredJob>();
+  const std::string wanted = fmt::format("{}WHERE id IN ({}) ORDER BY id", kJobColumns, list_of(ids));
   return connection_->exclusively([&](Database& database) -> Result<std::vector<StoredJob>> {
-    std::vector<std::int64_t> ids;
+    return jobs_of(database, prepare(database, wanted.c_str()));
+  });
+}
+
+Result<std::set<std::int64_t>> Store::came_with_batches(const std::set<std::int64_t>& ids) const {
+  if (ids.empty()) return std::set<std::int64_t>();
+  const std::string wanted = fmt::format(
+      "SELECT own.job FROM job_batches AS own JOIN batches ON batches.cell = own.cell AND batches.id = own.batch "
+      "WHERE own.job IN ({}) AND batches.job = own.job",
+      list_of(ids));
+  return connection_->exclusively([&](Database& database) -> Result<std::set<std::int64_t>> {
+    std::set<std::int64_t> came;
+    auto rows = prepare(database, wanted.c_str());
+    while (rows.next()) came.insert(rows.integer64(0));
+    return came;
+  });
+}
+
+Result<std::vector<StoredJob>> Store::unfinished_jobs() const {
+  const std::string all = fmt::format("{}WHERE state IN ('queued', 'running') ORDER BY id", kJobColumns);
+  return connection_->exclusively([&](Database& database) -> Result<std::vector<StoredJob>> {
+    if (database.is_shared()) return jobs_of(database, prepare(database, all.c_str()));
+    std::vector<std::int64_t> ids;  // of a file each is read alone: a row may be damaged
     Rows rows = prepare(database, "SELECT id FROM jobs WHERE state IN ('queued', 'running') ORDER BY id");
     while (rows.next()) ids.push_back(rows.integer64(0));
     std::vector<StoredJob> jobs;
@@ -380,12 +425,14 @@ Status Store::set_job_running(std::int64_t id) {
 Status Store::set_job_queued(std::int64_t id, bool attempt_counts) {
   return connection_->in_transaction([&](Database& database) -> Status {
     TRY(check_held(database, connection_->worker, id));
-    return changed_one(
-        change(database,
-               "UPDATE jobs SET state = 'queued', attempts = attempts - CASE WHEN attempts > 0 THEN $1 ELSE 0 END "
-               "WHERE id = $2 AND state IN ('queued', 'running')",
-               attempt_counts ? 0 : 1, id),
-        id);
+    // Of a job that was not begun no attempt is taken back: it would be another server's.
+    const int changes = change(database,
+                               "UPDATE jobs SET state = 'queued', attempts = attempts - "
+                               "CASE WHEN attempts > 0 AND state = 'running' THEN $1 ELSE 0 END "
+                               "WHERE id = $2 AND state IN ('queued', 'running')",
+                               attempt_counts ? 0 : 1, id);
+    tell_others(database);
+    return changed_one(changes, id);
   });
 }
 

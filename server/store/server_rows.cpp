@@ -19,10 +19,11 @@ namespace {
 
 constexpr std::int64_t kForgottenAfter = 86'400;  // s without a word
 
-/// `{"cell-7": [3, "5f..", "a0..", ""]}`.
+/// `{"cell-7": [3, "5f..", "a0..", "", false]}`.
 std::string spelled(const std::map<std::string, CellAtServer>& cells) {
   nlohmann::json json = nlohmann::json::object();
-  for (const auto& [cell, at] : cells) json[cell] = {at.version, at.files.cell, at.files.robot, at.why_not};
+  for (const auto& [cell, at] : cells)
+    json[cell] = {at.version, at.files.cell, at.files.robot, at.why_not, at.is_apart};
   return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
@@ -34,10 +35,22 @@ std::map<std::string, CellAtServer> cells_spelled(const std::string& text) {
   for (const auto& [cell, at] : json.items()) {
     const bool fits = at.is_array() && at.size() >= 4 && at[0].is_number_integer() && at[1].is_string() &&
                       at[2].is_string() && at[3].is_string();
-    if (fits)
-      cells[cell] = {at[0].get<int>(), {at[1].get<std::string>(), at[2].get<std::string>()}, at[3].get<std::string>()};
+    if (!fits) continue;
+    cells[cell] = {at[0].get<int>(), {at[1].get<std::string>(), at[2].get<std::string>()}, at[3].get<std::string>()};
+    cells[cell].is_apart = at.size() > 4 && at[4].is_boolean() && at[4].get<bool>();
   }
   return cells;
+}
+
+/// What starts before this one on the same host worked on waits for nobody: they are no more. Should one live all the
+/// same, it stores nothing of a job that another one has taken meanwhile.
+void end_leases_of_starts_before(Database& database, const std::string& token, const ServerSelf& self) {
+  const int ended = change(database,
+                           "UPDATE job_claims SET lease_until = 0 WHERE job IN (SELECT id FROM jobs WHERE state = "
+                           "'running') AND token IN (SELECT token FROM servers WHERE server = $1 AND host = $2 AND "
+                           "token <> $3)",
+                           self.server, self.host, token);
+  if (ended > 0) tell_others(database);
 }
 
 /// The row as a whole. A start before this one on the same host is no more.
@@ -106,14 +119,16 @@ Status Store::tell_presence(const ServerSelf& self) {
   ServerSelf named = self;
   named.server = connection_->worker.server;
   const Status told = connection_->urgently([&](Database& database) -> Status {
-    if (cells == connection_->told_cells &&
-        change(database, "UPDATE servers SET heard_at = $1, followed = $2 WHERE token = $3", now_of(database),
-               named.followed, token) == 1)
-      return {};
+    const std::string is_there =
+        fmt::format("UPDATE servers SET heard_at = {}, followed = $1 WHERE token = $2 RETURNING {}", now_in(database),
+                    unwaited_for(database));
+    if (cells == connection_->told_cells && exists(database, is_there.c_str(), named.followed, token)) return {};
+    if (!connection_->has_told) end_leases_of_starts_before(database, token, named);
     write_row(database, token, named, cells);
     return {};
   });
   connection_->told_cells = told ? cells : "";
+  connection_->has_told = connection_->has_told || told;
   return told;
 }
 

@@ -1,6 +1,5 @@
 #include "server/store/shared_schema.h"
 
-#include <array>
 #include <vector>
 
 #include "server/store/audit_rows.h"
@@ -18,17 +17,29 @@ struct Migration {
   int works_from;  ///< the oldest schema whose programs work on this one, too
 };
 
-const std::array<Migration, 3>& migrations() {
-  static const std::array<Migration, 3> all = {
-      {{in_postgres(std::string(kSchema) + kSchemaAdded + kTablesBeside + kAuditTables) +
-            "CREATE TABLE trammel_schema (version BIGINT NOT NULL, works_from BIGINT NOT NULL);"
-            "INSERT INTO trammel_schema (version, works_from) VALUES (0, 0);"
-            "INSERT INTO store_identity (id) VALUES (replace(CAST(gen_random_uuid() AS TEXT), '-', ''));",
-        1},
-       {std::string(kTablesGone) + "CREATE INDEX IF NOT EXISTS jobs_by_cell ON jobs (cell, id);"
-                                   "CREATE INDEX IF NOT EXISTS jobs_failed ON jobs (id) WHERE state = 'failed';",
-        2},
-       {in_postgres(std::string(kAuditServer) + kTablesOfServers), 3}}};
+std::vector<Migration> all_migrations() {
+  std::vector<Migration> all = {
+      {in_postgres(std::string(kSchema) + kSchemaAdded + kTablesBeside + kAuditTables) +
+           "CREATE TABLE trammel_schema (version BIGINT NOT NULL, works_from BIGINT NOT NULL);"
+           "INSERT INTO trammel_schema (version, works_from) VALUES (0, 0);"
+           "INSERT INTO store_identity (id) VALUES (replace(CAST(gen_random_uuid() AS TEXT), '-', ''));",
+       1},
+      {std::string(kTablesGone) + "CREATE INDEX IF NOT EXISTS jobs_by_cell ON jobs (cell, id);"
+                                  "CREATE INDEX IF NOT EXISTS jobs_failed ON jobs (id) WHERE state = 'failed';",
+       2},
+      {in_postgres(std::string(kAuditServer) + kTablesOfServers), 3}};
+#ifdef TRAMMEL_NEXT_SCHEMA
+  // The program of the next minor version, for the test of an update that goes from server to server.
+  all.push_back(
+      {"ALTER TABLE jobs ADD COLUMN colour TEXT NOT NULL DEFAULT '';"
+       "CREATE TABLE job_colours (job BIGINT PRIMARY KEY REFERENCES jobs (id));",
+       3});
+#endif
+  return all;
+}
+
+const std::vector<Migration>& migrations() {
+  static const std::vector<Migration> all = all_migrations();
   return all;
 }
 

@@ -63,10 +63,25 @@ struct StoredJob {
   std::string server = {};                       ///< that works on it, or did; empty: none, or not recorded
 };
 
+[[nodiscard]] inline bool is_over(const StoredJob& job) {
+  return job.state == JobState::kDone || job.state == JobState::kFailed;
+}
+
+/// The job that came with a batch.
+struct AcceptedJob : StoredJob {
+  bool is_repeat = false;  ///< the batch was there before, and the job with it
+};
+
 /// What became of the claim on a job that runs here.
 struct ClaimState {
   bool is_held = false;                          ///< false: the lease was over, and another server has taken the job
   std::optional<std::string> cancelled_by = {};  ///< who asked another server that it ends; empty: nobody
+};
+
+/// How far a record is: another number, another state of what it counts.
+struct RecordCounts {
+  std::int64_t changes = 0;       ///< see changes_made()
+  std::int64_t descriptions = 0;  ///< see descriptions_made()
 };
 
 /// What came of a wish that a job ends.
@@ -164,7 +179,7 @@ class Store {
   /// Accepts the batch and queues its training job (over this batch alone) in one transaction; returns the job. The
   /// same content under the same id again, from whomever, returns the job that the first one made. Refuses (kConflict)
   /// an id that the cell has with other content.
-  [[nodiscard]] Result<StoredJob> add_batch(const StoredBatch& batch, const StoredJob& job);
+  [[nodiscard]] Result<AcceptedJob> add_batch(const StoredBatch& batch, const StoredJob& job);
   /// What a change came to; empty: it has not been made. Refuses (kConflict) an id that stands for something else. The
   /// functions that take a ChangeId record it in the transaction of the change itself; where it is recorded already
   /// they change nothing and return what was made then. The last 100,000 are kept.
@@ -193,6 +208,8 @@ class Store {
   [[nodiscard]] Result<StoredBatch> batch_record(const std::string& cell, const std::string& id) const;
   /// How many changes the audit trail has: another number, another state of what it tells of.
   [[nodiscard]] Result<std::int64_t> changes_made() const;
+  /// The same with descriptions_made(), by one statement. Of a store that several servers share.
+  [[nodiscard]] Result<RecordCounts> counts() const;
   /// The ids of the batches that any model of the cell was trained from.
   [[nodiscard]] Result<std::set<std::string>> batches_learned_from(const std::string& cell) const;
   /// Puts the batch in quarantine for `reason`, or releases it (empty). Refuses (kConflict) one that was discarded.
@@ -212,13 +229,14 @@ class Store {
   [[nodiscard]] bool is_shared() const;
   /// How this server is called where it claims a job. Set before there are jobs.
   void works_as(const std::string& server);
-  /// Tells that this server still works on the job that it claimed.
+  /// Tells that this server still works on the job that it claimed. It waits for no disk and no standby: a lease that
+  /// is lost with a host ends earlier.
   [[nodiscard]] Result<ClaimState> renew_claim(std::int64_t job);
   /// Ends a job that waits, and has the server that works on it end one that runs. Refuses (kConflict) one that is
   /// over.
   [[nodiscard]] Result<CancelledJob> cancel_job(std::int64_t job, const JobOutcome& outcome, const ChangeId& by);
   /// A heartbeat: says to the others that this server is there, and what it does. Of a store that several servers
-  /// share; else nothing is told. For one thread at a time.
+  /// share; else nothing is told. It waits as little as renew_claim(). For one thread at a time.
   [[nodiscard]] Status tell_presence(const ServerSelf& self);
   /// It ends: the others need not wait for its heartbeat.
   [[nodiscard]] Status take_leave();
@@ -228,13 +246,16 @@ class Store {
   /// How many descriptions of cells there ever were: another number, another state of them.
   [[nodiscard]] Result<std::int64_t> descriptions_made() const;
   /// Compares how this server's files describe cells with the descriptions that the record goes by. A cell that has
-  /// none gets this one. Another one is taken where all servers that are there have it, two at least; or where no other
-  /// one is there and the one that is had was this server's own, as it `starts`. Returns the cells that it may not
-  /// answer for, and why, one sentence each. Needs tell_presence() before.
+  /// none gets this one. Another one is taken where more servers want it than have any other, two at least: those that
+  /// were started with it and are set apart for it; or where no other one is there and the one that is had was this
+  /// server's own, as it `starts`. Returns the cells whose files differ, and why it does not answer for them, or
+  /// changes nothing of them where they were the record's since it began (`agreed`), one sentence each. Needs
+  /// tell_presence() before.
   [[nodiscard]] Result<std::map<std::string, std::string>> agree_on_cells(
-      const std::map<std::string, CellDescription>& mine, bool starts);
-  /// The jobs that wait and that no server works on that is believed to live, nor on another one of their cell.
-  [[nodiscard]] Result<std::set<std::int64_t>> jobs_to_take() const;
+      const std::map<std::string, CellDescription>& mine, bool starts, const std::set<std::string>& agreed = {});
+  /// The jobs that wait and that no server works on that is believed to live, nor on another one of their cell; with
+  /// the cell of each. By one statement.
+  [[nodiscard]] Result<std::map<std::int64_t, std::string>> jobs_to_take() const;
   /// What was changed by changes that came after so many; see changes_made().
   [[nodiscard]] Result<std::set<std::string>> cells_changed_after(std::int64_t changes) const;
   /// Returns when another server may have changed something, after `limit` at the latest, or when `stop` is requested.
@@ -244,6 +265,10 @@ class Store {
   [[nodiscard]] Status check_expected(const std::string& cell, const ChangeId& change_id) const;
 
   [[nodiscard]] Result<StoredJob> job(std::int64_t id) const;
+  /// Those of these jobs that there are, oldest first. By two statements, however many they are.
+  [[nodiscard]] Result<std::vector<StoredJob>> jobs(const std::set<std::int64_t>& ids) const;
+  /// Those of these jobs that came with their batch. Somebody asked for the others.
+  [[nodiscard]] Result<std::set<std::int64_t>> came_with_batches(const std::set<std::int64_t>& ids) const;
   /// Queued and running jobs of all cells, oldest first: a restart must finish them. What cannot be read of them is
   /// left out, and stands in state().
   [[nodiscard]] Result<std::vector<StoredJob>> unfinished_jobs() const;

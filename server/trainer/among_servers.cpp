@@ -19,73 +19,86 @@ constexpr std::chrono::seconds kFollowTick{2};  // where no word came of a chang
 void Trainer::follow(std::int64_t followed, const std::stop_token& stop) {
   ::pthread_setname_np(::pthread_self(), "follower");
   while (!stop.stop_requested()) {
-    keep_claim();
-    agree();
-    followed = follow_models(followed);
-    presence_.has_followed(followed);
-    keep_claim();
+    keep_claim();  // whoever cancels it elsewhere is heard at once
+    if (const auto now = store_.counts()) {
+      agree(now->descriptions);
+      followed = follow_models(followed, now->changes);
+      presence_.has_followed(followed);
+    }
     follow_jobs();
     store_.wait_for_change(stop, kFollowTick);
   }
 }
 
-std::int64_t Trainer::follow_models(std::int64_t followed) {
-  const auto made = store_.changes_made();
-  if (!made || *made == followed) return followed;
-  const bool lost = *made < followed;
+std::int64_t Trainer::follow_models(std::int64_t followed, std::int64_t made) {
+  if (made == followed) return followed;
+  const bool lost = made < followed;
   if (lost && trouble_listener_)
-    trouble_listener_(fmt::format("the record has {} changes and had {}: it is of an earlier moment", *made, followed),
+    trouble_listener_(fmt::format("the record has {} changes and had {}: it is of an earlier moment", made, followed),
                       false);
   const auto changed = store_.cells_changed_after(lost ? 0 : followed);
   if (!changed) return followed;
   bool all = true;
   for (const std::string& cell : *changed) {
     if (cells().contains(cell) && !history_.follow(cell)) all = false;
-    keep_claim();  // a record that answers slowly must not end the lease
   }
-  return all ? *made : followed;
+  return all ? made : followed;
 }
 
 void Trainer::follow_jobs() {
-  const MutexLock lock(submit_mutex_);
+  // Before the lock: whoever submits does not wait for it. What is made meanwhile is looked at the next time.
   const auto to_take = store_.jobs_to_take();
   if (!to_take) return;
+  const MutexLock lock(submit_mutex_);
+  std::set<std::int64_t> elsewhere, ready;
   for (const JobProgress& known : book_.unfinished()) {
-    if (to_take->contains(known.job) || known.job == runner_.claimed()) continue;
-    const auto job = store_.job(known.job);
-    if (!job || !book_.find(known.job)) continue;
-    const bool is_over = job->state == JobState::kDone || job->state == JobState::kFailed;
-    const JobProgress now = stored_progress(*job);
-    if (is_over) static_cast<void>(queue_.remove(known.job));
-    if (is_over || now.stage != known.stage || now.what != known.what) book_.report(now);
+    if (!to_take->contains(known.job) && known.job != runner_.claimed()) elsewhere.insert(known.job);
   }
+  const std::set<std::int64_t> waiting = queue_.jobs();
+  for (const auto& [id, cell] : *to_take) {
+    if (!waiting.contains(id) && cells_.find(cell)) ready.insert(id);
+  }
+  std::set<std::int64_t> wanted = ready;
+  wanted.insert(elsewhere.begin(), elsewhere.end());
+  auto jobs = store_.jobs(wanted);
+  if (!jobs) return;
+  const auto came = store_.came_with_batches(ready);
   std::vector<std::string> notices;  // the start of a server says them
-  const std::set<std::int64_t> known = queue_.jobs();
-  for (const std::int64_t id : *to_take) {
-    if (known.contains(id)) continue;
-    auto job = store_.job(id);
-    const bool is_over = job && (job->state == JobState::kDone || job->state == JobState::kFailed);  // meanwhile
-    if (!job || is_over || !can_take_up(*job, notices).value_or(false)) continue;
-    job->state = JobState::kQueued;
-    enqueue(*job, was_asked_for(*job).value_or(true));
+  for (StoredJob& job : *jobs) {
+    if (elsewhere.contains(job.id)) follow_job(job);
+    if (!ready.contains(job.id) || is_over(job) || !can_take_up(job, notices).value_or(false)) continue;
+    job.state = JobState::kQueued;
+    enqueue(job, !came || !came->contains(job.id));
   }
 }
 
-void Trainer::agree() {
+void Trainer::follow_job(const StoredJob& job) {
+  const auto known = book_.find(job.id);
+  if (!known) return;
+  const JobProgress now = stored_progress(job);
+  if (is_over(job)) static_cast<void>(queue_.remove(job.id));
+  if (is_over(job) || now.stage != known->stage || now.what != known->what) book_.report(now);
+}
+
+void Trainer::agree(std::int64_t descriptions) {
   const MutexLock lock(agree_mutex_);
-  const auto made = store_.descriptions_made();
-  const bool is_settled = made && *made == descriptions_ && cells_.apart().empty();
-  if (!made || !is_present_ || is_settled) return;
-  auto apart = store_.agree_on_cells(presence_.descriptions(), descriptions_ < 0);
-  if (!apart) return;
-  descriptions_ = *made;  // what was told since then is compared by the next look
-  if (*apart != cells_.apart()) {
-    cells_.set_apart(std::move(*apart));
+  if (!is_present_ || (descriptions == descriptions_ && cells_.all_answer())) return;
+  const auto mine = presence_.descriptions();
+  auto disputes = store_.agree_on_cells(mine, descriptions_ < 0, agreed_);
+  if (!disputes) return;
+  descriptions_ = descriptions;  // what was told since then is compared by the next look
+  std::map<std::string, ApartCell> apart;
+  for (auto& [cell, why] : *disputes) apart[cell] = {std::move(why), agreed_.contains(cell)};
+  for (const auto& [cell, files] : mine) {
+    if (!apart.contains(cell)) agreed_.insert(cell);
+  }
+  if (apart != cells_.apart()) {
+    cells_.set_apart(std::move(apart));
     presence_.has_changed();
   }
   const auto running = book_.find(runner_.claimed());
-  if (!running || !cells_.why_apart(running->cell)) return;
-  runner_.lose_claim();  // it is computed from the wrong files
+  if (!running || cells_.find(running->cell)) return;
+  runner_.lose_claim(running->job);  // it is computed from the wrong files
   static_cast<void>(queue_.cancel(running->job));
 }
 
@@ -102,7 +115,8 @@ void Trainer::beat(const std::stop_token& stop) {
 }
 
 ServerSelf Trainer::self() const {
-  std::map<std::string, std::string> why = cells_.apart();
+  std::map<std::string, std::string> why;
+  for (const auto& [cell, one] : cells_.apart()) why.emplace(cell, one.why);
   for (const auto& [cell, trouble] : history_.cell_troubles()) why.emplace(cell, trouble.what);
   ServerSelf self = options_.self;
   self.server = store_.server();
@@ -111,7 +125,8 @@ ServerSelf Trainer::self() const {
   auto files = presence_.descriptions();
   for (const auto& [name, cell] : cells()) {
     const bool is_apart = cells_.why_apart(name).has_value();
-    self.cells[name] = {is_apart ? 0 : registry_.version_in_force(name), std::move(files[name]), std::move(why[name])};
+    self.cells[name] = {is_apart ? 0 : registry_.version_in_force(name), std::move(files[name]), std::move(why[name]),
+                        is_apart};
   }
   return self;
 }
@@ -138,7 +153,10 @@ ServerInRecord Trainer::alone() const {
 
 std::map<std::string, CellTrouble> Trainer::cell_troubles() const {
   auto troubles = history_.cell_troubles();
-  for (const auto& [cell, why] : cells_.apart()) troubles[cell] = {CellTrouble::Kind::kSetApart, why};
+  for (const auto& [cell, one] : cells_.apart()) {
+    if (one.answers) troubles.try_emplace(cell, CellTrouble{CellTrouble::Kind::kFormerFiles, one.why});
+    if (!one.answers) troubles[cell] = {CellTrouble::Kind::kSetApart, one.why};
+  }
   return troubles;
 }
 
@@ -147,7 +165,7 @@ void Trainer::keep_claim() {
   if (job == 0) return;
   const auto claim = store_.renew_claim(job);
   if (!claim) return;  // a record that is away lets nobody else claim it, either
-  if (!claim->is_held) runner_.lose_claim();
+  if (!claim->is_held) runner_.lose_claim(job);
   if (!claim->is_held || claim->cancelled_by) static_cast<void>(queue_.cancel(job, claim->cancelled_by.value_or("")));
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <map>
 #include <memory>
@@ -13,8 +14,16 @@
 
 namespace trammel {
 
+/// A cell whose files the record does not go by.
+struct ApartCell {
+  std::string why;
+  bool answers = false;  ///< the record did when this server began: it goes on with the model that it has
+  bool operator==(const ApartCell&) const = default;
+};
+
 /// Which cells are served. Cells are added while requests and jobs are under way; none leaves. Some may be set apart:
-/// this server knows them and may not answer for them now. Thread-safe; whoever reads waits for moments only.
+/// this server knows them and may change nothing of them now, nor answer for most. Thread-safe; whoever reads waits for
+/// moments only.
 class CellBook {
  public:
   explicit CellBook(ServedCells cells) { keep(std::move(cells)); }
@@ -22,27 +31,38 @@ class CellBook {
   /// Stays as it is as long as the book is there; the next call may give more cells.
   [[nodiscard]] const ServedCells& now() const { return *now_.load(); }
 
-  /// A cell that this server may answer for; else kNotFound, or kConflict with the reason.
+  /// A cell that this server may change; else kNotFound, or kConflict with the reason.
   [[nodiscard]] Result<std::shared_ptr<const Cell>> find(const std::string& name) const {
-    if (const auto why = why_apart(name)) return failure(ErrorCode::kConflict, "{}", *why).of("cell").with_text(name);
+    if (const auto one = find_apart(name))
+      return failure(ErrorCode::kConflict, "{}", one->why).of("cell").with_text(name);
     return find_cell(now(), name);
   }
 
-  /// From now on these are set apart, for a reason each, and no others.
-  void set_apart(std::map<std::string, std::string> cells) {
+  /// From now on these are set apart, and no others.
+  void set_apart(std::map<std::string, ApartCell> cells) {
     const MutexLock lock(apart_mutex_);
     any_apart_ = !cells.empty();
     apart_ = std::move(cells);
   }
-  [[nodiscard]] std::optional<std::string> why_apart(const std::string& cell) const {
+  [[nodiscard]] std::optional<ApartCell> find_apart(const std::string& cell) const {
     if (!any_apart_) return std::nullopt;
     const MutexLock lock(apart_mutex_);
     const auto found = apart_.find(cell);
     return found == apart_.end() ? std::nullopt : std::optional(found->second);
   }
-  [[nodiscard]] std::map<std::string, std::string> apart() const {
+  /// Why this server may not answer for the cell; empty: it may.
+  [[nodiscard]] std::optional<std::string> why_apart(const std::string& cell) const {
+    const auto one = find_apart(cell);
+    return one && !one->answers ? std::optional(one->why) : std::nullopt;
+  }
+  [[nodiscard]] std::map<std::string, ApartCell> apart() const {
     const MutexLock lock(apart_mutex_);
     return apart_;
+  }
+  /// Of those that are set apart.
+  [[nodiscard]] bool all_answer() const {
+    const MutexLock lock(apart_mutex_);
+    return std::all_of(apart_.begin(), apart_.end(), [](const auto& named) { return named.second.answers; });
   }
 
   /// A cell that is there already stays as it was.
@@ -63,7 +83,7 @@ class CellBook {
   std::vector<std::unique_ptr<const ServedCells>> kept_;  // somebody may read one: pointers to cells, one map an add()
   std::atomic<const ServedCells*> now_ = nullptr;
   mutable Mutex apart_mutex_;  // taken last
-  std::map<std::string, std::string> apart_ TRAMMEL_GUARDED_BY(apart_mutex_);
+  std::map<std::string, ApartCell> apart_ TRAMMEL_GUARDED_BY(apart_mutex_);
   std::atomic<bool> any_apart_ = false;
 };
 

@@ -79,6 +79,11 @@ bool JobQueue::remove(std::int64_t id) {
   return is_removed(id);
 }
 
+void JobQueue::remove_cell(const std::string& cell) {
+  const MutexLock lock(mutex_);
+  waiting_.erase(cell);
+}
+
 bool JobQueue::is_removed(std::int64_t id) {
   for (auto cell = waiting_.begin(); cell != waiting_.end(); ++cell) {
     if (std::erase_if(cell->second, [id](const WaitingJob& job) { return job.id == id; }) == 0) continue;

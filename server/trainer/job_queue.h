@@ -51,6 +51,8 @@ class JobQueue {
   [[nodiscard]] std::string cancelled_by() const;
   /// Takes a job that waits out of the queue; false: it does not wait here.
   [[nodiscard]] bool remove(std::int64_t id);
+  /// The same for all of a cell.
+  void remove_cell(const std::string& cell);
 
   /// Those that wait here, and the one whose turn has come.
   [[nodiscard]] std::set<std::int64_t> jobs() const;

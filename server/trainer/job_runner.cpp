@@ -118,7 +118,7 @@ JobRunner::Attempt JobRunner::attempt(std::int64_t id, const StopRequests& stop)
     const bool elsewhere = running.error().code == ErrorCode::kConflict;
     return tl::make_unexpected(Failed{running.error(), verdict_of(running.error()), false, {}, elsewhere});
   }
-  lost_ = false;
+  lost_ = 0;
   claimed_ = id;
   // The cell may have been set apart while the claim was made: nobody saw a job to end.
   if (const auto cell = cells_.find(job->cell); !cell)
@@ -209,9 +209,7 @@ std::optional<FleetPrior> JobRunner::fleet_prior_of(const StoredJob& job) const 
 
 Result<bool> JobRunner::came_with_batch(const StoredJob& job) const {
   if (job.kind != JobKind::kTrain || job.batch_ids.size() != 1) return false;
-  return store_.batch_record(job.cell, job.batch_ids.front()).map([&](const StoredBatch& batch) {
-    return batch.job == job.id;
-  });
+  return store_.came_with_batches({job.id}).map([](const std::set<std::int64_t>& came) { return !came.empty(); });
 }
 
 Status JobRunner::give_batches(Computing& computing, const StoredJob& job, const std::optional<StoredDiagnosis>& asked,
@@ -280,11 +278,15 @@ JobRunner::Attempt JobRunner::finish(const StoredJob& job, const Made& made, con
 
 JobRunner::End JobRunner::end(std::int64_t id, const Failed& failed, const StopRequests& stop,
                               const CancelledBy& cancelled_by) {
-  if (failed.elsewhere || lost_) return End::kElsewhere;
-  auto stored = store_.job(id);
   StoredJob job;
   job.id = id;
-  if (stored) job = std::move(*stored);
+  if (const auto known = book_.find(id)) job.cell = known->cell;
+  if (failed.elsewhere || lost_ == id) {
+    // Where this server may not work for the cell, others need not wait for the end of its lease.
+    if (claimed_ == id && !cells_.find(job.cell)) static_cast<void>(store_.set_job_queued(id));
+    return End::kElsewhere;
+  }
+  if (auto stored = store_.job(id)) job = std::move(*stored);
   const bool cancelled = stop.job.stop_requested();
   if (stop.service.stop_requested() && !cancelled) return put_back(job, job.message, false, stop);
   const std::string why = sentence(failed.error);

@@ -38,8 +38,8 @@ class JobRunner {
   [[nodiscard]] End run(std::int64_t job, const StopRequests& stop, const CancelledBy& cancelled_by);
   /// The job that is this server's now, until it is over; 0: none. Thread-safe.
   [[nodiscard]] std::int64_t claimed() const { return claimed_; }
-  /// That job is another server's now: its attempt here leaves no trace. Thread-safe.
-  void lose_claim() { lost_ = true; }
+  /// That job is not this server's any more: its attempt here leaves no trace. Thread-safe.
+  void lose_claim(std::int64_t job) { lost_ = job; }
 
  private:
   /// How an attempt ended that made nothing.
@@ -95,7 +95,7 @@ class JobRunner {
   ProgressBook& book_;
   const TrainerOptions options_;
   std::atomic<std::int64_t> claimed_ = 0;
-  std::atomic<bool> lost_ = false;
+  std::atomic<std::int64_t> lost_ = 0;
 };
 
 }  // namespace trammel

@@ -151,6 +151,8 @@ Status ModelHistory::follow(const std::string& cell) {
   if (!decided || *decided == registry_.version_in_force(cell)) return {};
   auto model = registry_.version(cell, *decided);
   if (!model) {
+    // A model by files that the record goes by now may not fit those of before: this server goes on with what it has.
+    if (cells_.find_apart(cell) && model.error().code != ErrorCode::kBusy) return {};
     registry_.announce(cell, *decided);  // whoever asks for it hears why it is not served
     if (model.error().code == ErrorCode::kBusy) return tl::make_unexpected(model.error());
     return {};
@@ -283,7 +285,11 @@ Result<Kept> ModelHistory::keep(const Candidate& candidate, const Judging& judgi
   const MutexLock lock(changes_of(cell));
   const auto recorded = TRY(store_.version_in_force(cell));
   auto found = TRY(judged(candidate, judging, registry_.in_force(cell).get()));
-  return store(candidate, std::move(found), recorded.value_or(0));
+  auto kept = store(candidate, std::move(found), recorded.value_or(0));
+  // The lock holds up this server's decisions only. What others decide all the time is no fault of the model.
+  if (!kept && kept.error().code == ErrorCode::kConflict && store_.is_shared())
+    return failure(ErrorCode::kBusy, "cell {}: what is in force changes all the time", cell).next("try again later");
+  return kept;
 }
 
 Result<Kept> ModelHistory::store(const Candidate& candidate, Judged judged, int expected) {

@@ -45,6 +45,7 @@ struct CellTrouble {
     kOfAnotherRobot,  ///< not served: its robot or its tools are not the model's
     kUnreadable,      ///< not served: no version in force can be read
     kSetApart,        ///< not served here: another server has other files of the cell
+    kFormerFiles,     ///< served as long as this server is not started again: the record went over to other files
     kOlderServed,     ///< served with an older version
     kCopyServed       ///< served with the right one, which only its copy still has
   } kind = Kind::kUnreadable;
@@ -103,7 +104,7 @@ class ModelHistory {
   /// Stores the model, ends its job and, if `judging` says so, puts it in force. What the job may release leaves
   /// quarantine where the model goes in force, and where too few poses can judge it. It is judged without its cell's
   /// lock, again where something else went in force meanwhile; after a few times with the lock. Refuses (kBusy) once
-  /// `stop` was requested.
+  /// `stop` was requested, and where other servers change what is in force all the time.
   [[nodiscard]] Result<Kept> keep(const Candidate& candidate, const Judging& judging, const std::stop_token& stop = {});
 
  private:

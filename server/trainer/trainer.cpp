@@ -84,7 +84,7 @@ Result<std::vector<std::string>> Trainer::take_up() {
   if (store_.is_shared()) {
     presence_.describe(cells());
     is_present_ = store_.tell_presence(self()).has_value();  // the others know of it before it compares
-    agree();
+    if (const auto now = store_.counts()) agree(now->descriptions);
   }
   const auto until = std::chrono::steady_clock::now() + kLoadingAtStart;
   const ServedCells& served = cells();
@@ -117,7 +117,7 @@ Result<bool> Trainer::can_take_up(const StoredJob& job, std::vector<std::string>
     notices.push_back(fmt::format("job {} waits: cell {} is not served here", job.id, job.cell));
     return false;
   }
-  if (cells_.why_apart(job.cell)) return false;  // that is said already
+  if (!cells_.find(job.cell)) return false;  // it is set apart: that is said already
   if (job.state != JobState::kRunning || job.attempts < kMaxAttempts) return true;
   if (store_.is_shared() && !store_.set_job_running(job.id)) return false;  // another server works on it
   const std::string why = fmt::format("its training was interrupted by a crash {} times", job.attempts);
@@ -144,6 +144,8 @@ Result<std::vector<std::string>> Trainer::start() {
           runner_.run(taken->job.id, {stop, taken->cancelled}, [this] { return queue_.cancelled_by(); });
       if (end == JobRunner::End::kAgain) queue_.push(taken->job);
       if (end == JobRunner::End::kOver) prune(taken->job.cell, stop);
+      // Another one works for the cell. What else waits of it is looked for when that is over.
+      if (end == JobRunner::End::kElsewhere) queue_.remove_cell(taken->job.cell);
       queue_.put_down();
       // Asked for while its attempt ended: it waits again, and nobody told it.
       if (end == JobRunner::End::kAgain && taken->cancelled.stop_requested())
@@ -206,7 +208,7 @@ std::vector<std::string> Trainer::add_cells(const ServedCells& more) {
       const MutexLock look_again(agree_mutex_);
       descriptions_ = -1;
     }
-    agree();
+    if (const auto now = store_.counts()) agree(now->descriptions);
   }
   std::vector<std::string> notices;
   for (const auto& [name, cell] : more) {
@@ -257,7 +259,7 @@ std::vector<std::string> Trainer::troubles() const {
   if (state.why_not_written) all.push_back("the store cannot be written: " + sentence(*state.why_not_written));
   if (!state.clock.empty()) all.push_back(state.clock);
   for (std::string& damage : state.damages) all.push_back(std::move(damage));
-  for (const auto& [cell, why] : cells_.apart()) all.push_back(why);
+  for (const auto& [cell, one] : cells_.apart()) all.push_back(one.why);
   for (std::string& trouble : history_.troubles()) {
     if (std::find(all.begin(), all.end(), trouble) == all.end()) all.push_back(std::move(trouble));
   }
@@ -304,9 +306,8 @@ Result<std::int64_t> Trainer::take_in(StoredBatch batch) {
   job.created_at = unix_now();
 
   const MutexLock lock(submit_mutex_);
-  const bool repeated = store_.batch_record(batch.cell, batch.id).has_value();
   const auto accepted = TRY(store_.add_batch(batch, job));
-  if (!repeated) enqueue(accepted, false);
+  if (!accepted.is_repeat) enqueue(accepted, false);
   return accepted.id;
 }
 
@@ -425,10 +426,10 @@ Status Trainer::cancel(std::int64_t id, const ChangeId& by) {
   const auto made = TRY(store_.outcome_of(by));
   if (made) return {};
   const auto job = TRY(store_.job(id));
-  const auto asked_for = TRY(was_asked_for(job));
   const auto over = [id] { return failure(ErrorCode::kConflict, "job {} is over", id).of("job").with_value(id); };
-  if (job.state == JobState::kDone || job.state == JobState::kFailed) return over();
+  if (is_over(job)) return over();
   if (store_.is_shared()) return cancel_in_record(job, by);
+  const auto asked_for = TRY(was_asked_for(job));
   const JobQueue::Cancelled found = queue_.cancel(id, by.who);
   if (found == JobQueue::Cancelled::kStopping) return {};
   if (found == JobQueue::Cancelled::kUnknown) return over();
@@ -596,9 +597,7 @@ void Trainer::enqueue(const StoredJob& job, bool asked_for) {
 
 Result<bool> Trainer::was_asked_for(const StoredJob& job) const {
   if (job.kind != JobKind::kTrain || job.batch_ids.size() != 1) return true;
-  return store_.batch_record(job.cell, job.batch_ids.front()).map([&](const StoredBatch& batch) {
-    return batch.job != job.id;
-  });
+  return store_.came_with_batches({job.id}).map([](const std::set<std::int64_t>& came) { return came.empty(); });
 }
 
 }  // namespace trammel

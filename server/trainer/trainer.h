@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -165,12 +166,15 @@ class Trainer {
   void take_up_late();
   /// Where several servers share the store: takes up what others changed, and keeps the claim on the job that runs.
   void follow(std::int64_t followed, const std::stop_token& stop);
-  /// What is in force since `followed` changes; returns how many there are.
-  [[nodiscard]] std::int64_t follow_models(std::int64_t followed);
+  /// What is in force since `followed` changes, of so many that were `made`; returns how many it has taken up.
+  [[nodiscard]] std::int64_t follow_models(std::int64_t followed, std::int64_t made);
   /// Which jobs wait, run elsewhere or are over.
   void follow_jobs();
+  /// Tells of a job that is known here what became of it elsewhere.
+  void follow_job(const StoredJob& job);
   /// Compares the files of its cells with the record where either may have changed, and sets those apart that differ.
-  void agree() TRAMMEL_EXCLUDES(agree_mutex_);
+  /// `descriptions`: how many there ever were.
+  void agree(std::int64_t descriptions) TRAMMEL_EXCLUDES(agree_mutex_);
   /// Tells the others that it is there, and keeps the claim on the job that runs. Waits for nobody else's work.
   void beat(const std::stop_token& stop);
   /// As it sees itself: nobody else has its store.
@@ -225,6 +229,7 @@ class Trainer {
   std::atomic<bool> is_present_ = false;  // the others know of it
   Mutex agree_mutex_;
   std::int64_t descriptions_ TRAMMEL_GUARDED_BY(agree_mutex_) = -1;  // those that it has compared with
+  std::set<std::string> agreed_ TRAMMEL_GUARDED_BY(agree_mutex_);  // cells whose files were the record's since it began
   const std::int64_t began_at_;
   std::jthread worker_, keeper_, follower_, heartbeat_, reclaimer_;
 };

@@ -1,9 +1,10 @@
 // Two servers and a training host with one PostgreSQL, all of which are killed (SIGKILL) or stopped (SIGSTOP) while
 // four clients submit, train, activate, roll back, release, discard and read, and two more ask for predictions. What
 // they asked and were answered is checked by tests/faults/history/history_check.py.
-// --kills N, --seed N, --history FILE to keep it.
+// --kills N, --seed N, --jobs-s N, --history FILE to keep it.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <iostream>
 
 #include "tests/support/figure.h"
@@ -21,7 +22,10 @@ void tell_times(const std::string& what, std::vector<double> times) {
 }
 
 int measure(const test::KillPlan& plan, const std::string& history) {
+  const auto begin = std::chrono::steady_clock::now();
   const test::KillOutcome outcome = test::kill_a_fleet(plan, history);
+  test::tell_figure("kills: the whole run, s",
+                    std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
   int kills = 0;
   for (const auto& [what, count] : outcome.kills) {
     kills += count;
@@ -30,7 +34,15 @@ int measure(const test::KillPlan& plan, const std::string& history) {
   const test::Finished checked = test::check_history(history);
   std::cout << checked.out << checked.err << std::flush;
   test::tell_figure("kills: kills", kills);
+  test::tell_figure("kills: jobs", outcome.jobs);
+  test::tell_figure("kills: jobs that waited when the last kill was over", outcome.left_over);
+  test::tell_figure("kills: jobs that have not ended", outcome.open);
+  test::tell_figure("kills: from the last kill until all jobs had ended, s", outcome.jobs_ended_s);
+  test::tell_figure("kills: jobs of a cell wait and nobody works for it, longest, s", outcome.longest_idle_s);
+  test::tell_figure("kills: jobs of a cell wait and nobody works for it, sum, s", outcome.idle_s);
   test::tell_figure("kills: jobs that three servers died of", outcome.given_up);
+  test::tell_figure("kills: predictions while servers were killed", outcome.predictions);
+  test::tell_figure("kills: predictions that failed", outcome.failed);
   test::tell_figure("kills: audit trail broken", outcome.trail_whole ? 0 : 1);
   test::tell_figure("kills: cells served otherwise than is in force", outcome.served_otherwise);
   test::tell_figure("kills: p99 of a prediction in a quiet fleet, ms", outcome.p99_quiet_ms);
@@ -56,6 +68,9 @@ int main(int argc, char** argv) {
   app.add_option("--kills", plan.kills)->check(CLI::Range(1, 10000));
   app.add_option("--seed", plan.seed);
   app.add_option("--history", history);
+  int jobs_s = static_cast<int>(plan.until_jobs_end.count());
+  app.add_option("--jobs-s", jobs_s, "How long jobs may take to end after the last kill")->check(CLI::Range(1, 86400));
   CLI11_PARSE(app, argc, argv);
+  plan.until_jobs_end = std::chrono::seconds(jobs_s);
   return trammel::measure(plan, history.empty() ? folder.file("history.jsonl") : history);
 }

@@ -389,10 +389,15 @@ TEST_F(Fleet, ACellThatAServerDescribesOtherwiseIsNotServedThereUntilTheyAgree) 
   EXPECT_TRUE(both->predict_error(kContext, test::virtual_joints(1, 7))) << "the other one answers";
 
   command({"store", "describe", url_, "--cell", "cell-7", "--as", second_.name()});
-  wait_until([&] { return page(first_, "/readyz?cell=cell-7").body.find("described_otherwise") != std::string::npos; },
-             "now it is the first one that has another file");
+  const auto has_former_files = [&] {
+    return page(first_, "/readyz?cell=cell-7").body.find("former_files") != std::string::npos;
+  };
+  wait_until(has_former_files, "now it is the first one that has another file");
+  EXPECT_EQ(served(*one), 1) << "it goes on with the model that it has";
+  EXPECT_FALSE(one->submit_measurements("cell-7", "b3", test::virtual_batch_csv(60, 3))) << "and changes nothing";
   command({"store", "describe", url_, "--cell", "cell-7", "--as", first_.name()});
-  wait_until([&] { return served(*one) == 1; }, "a person has said whose files count");
+  wait_until([&] { return !has_former_files(); }, "a person has said whose files count");
+  EXPECT_EQ(served(*one), 1);
 
   EXPECT_EQ(second_.stop(), 0);
   ASSERT_TRUE(write_text_file(cell_file_of(second_), own));

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <map>
 #include <memory>
 #include <set>
 #include <thread>
@@ -61,7 +62,7 @@ TEST_F(Claims, OneCellIsTrainedByOneServerAtATimeAndAnotherCellMeanwhile) {
   ASSERT_TRUE(one_->set_job_running(first));
   EXPECT_EQ(other_->set_job_running(second).error().code, ErrorCode::kConflict);
   EXPECT_EQ(demand(other_->job(second)).state, JobState::kQueued) << "it waits";
-  EXPECT_EQ(demand(other_->jobs_to_take()), std::set<std::int64_t>{of_eight});
+  EXPECT_EQ(demand(other_->jobs_to_take()), (std::map<std::int64_t, std::string>{{of_eight, "cell-8"}}));
   EXPECT_TRUE(other_->set_job_running(of_eight));
   ASSERT_TRUE(one_->set_job_done(first, "done"));
   EXPECT_TRUE(other_->set_job_running(second));
@@ -118,6 +119,89 @@ TEST_F(Claims, AJobThatWasToEndEndsAlsoWhereItsServerIsGone) {
   let_lease_pass(job);
   ASSERT_TRUE(other_->set_job_running(job));
   EXPECT_EQ(demand(other_->renew_claim(job)).cancelled_by, "anna");
+}
+
+TEST_F(Claims, WhatAServerWorkedOnBeforeItWasStartedAgainWaitsForNobody) {
+  const std::int64_t job = submit("cell-7", "b1"), second = submit("cell-7", "b2");
+  const auto here = [](const std::string& host) { return ServerSelf{"", host, 7, "0.1.0", true, true, {}, 0}; };
+  ASSERT_TRUE(one_->tell_presence(here("host-a")));
+  ASSERT_TRUE(one_->set_job_running(job));
+  const auto elsewhere = open("one");
+  ASSERT_TRUE(elsewhere->tell_presence(here("host-b")));
+  EXPECT_TRUE(demand(other_->jobs_to_take()).empty()) << "one of the same name on another host is another one";
+  const auto again = open("one");
+  ASSERT_TRUE(again->tell_presence(here("host-a")));
+  EXPECT_EQ(demand(other_->jobs_to_take()).size(), 2U) << "killed and started again: its lease ends at once";
+  ASSERT_TRUE(other_->set_job_running(second)) << "its cell is free, too";
+  EXPECT_EQ(again->set_job_running(job).error().code, ErrorCode::kConflict);
+  ASSERT_TRUE(other_->set_job_done(second, "done"));
+  ASSERT_TRUE(again->set_job_running(job));
+  EXPECT_EQ(add_model(*one_, job), 0) << "should the first start live all the same, it stores nothing of it";
+  ASSERT_TRUE(again->tell_presence(here("host-a")));
+  EXPECT_TRUE(demand(again->renew_claim(job)).is_held) << "what it works on itself stays its own";
+  EXPECT_FALSE(demand(other_->jobs_to_take()).contains(job));
+}
+
+TEST_F(Claims, OfAJobThatIsPutBackWithoutHavingBeenBegunNoAttemptIsTakenBack) {
+  const std::int64_t job = submit("cell-7", "b1");
+  ASSERT_TRUE(one_->set_job_running(job));
+  ASSERT_TRUE(one_->set_job_queued(job, true)) << "its computing broke off: that counts";
+  ASSERT_TRUE(other_->set_job_queued(job)) << "it could not be begun";
+  EXPECT_EQ(demand(one_->job(job)).attempts, 1);
+  ASSERT_TRUE(one_->set_job_running(job));
+  ASSERT_TRUE(one_->set_job_queued(job)) << "the server stops: that does not count";
+  EXPECT_EQ(demand(one_->job(job)).attempts, 1);
+}
+
+TEST_F(Claims, OthersHearAtOnceOfAJobThatIsPutBack) {
+  const std::int64_t job = submit("cell-7", "b1");
+  ASSERT_TRUE(one_->set_job_running(job));
+  std::stop_source never;
+  other_->wait_for_change(never.get_token(), std::chrono::seconds(30));  // connects, and hears from then on
+  ASSERT_TRUE(one_->set_job_queued(job));
+  other_->wait_for_change(never.get_token(), std::chrono::hours(1));
+  EXPECT_TRUE(demand(other_->jobs_to_take()).contains(job));
+}
+
+TEST_F(Claims, JobsAreReadTogetherAndWhatCameWithABatchIsToldFromWhatWasAskedFor) {
+  const std::int64_t came = submit("cell-7", "b1"), of_eight = submit("cell-8", "b1");
+  StoredJob asked = test::job_of("b1");
+  const std::int64_t wanted = demand(one_->add_job(asked)).id;
+  const auto jobs = demand(other_->jobs({came, of_eight, wanted, 999}));
+  ASSERT_EQ(jobs.size(), 3U);
+  EXPECT_EQ(jobs[1].cell, "cell-8");
+  for (const StoredJob& job : jobs) EXPECT_EQ(job.batch_ids, std::vector<std::string>{"b1"});
+  EXPECT_EQ(demand(other_->came_with_batches({came, of_eight, wanted})), (std::set<std::int64_t>{came, of_eight}));
+  EXPECT_TRUE(demand(other_->jobs({})).empty());
+  const auto unfinished = demand(other_->unfinished_jobs());
+  ASSERT_EQ(unfinished.size(), 3U);
+  EXPECT_EQ(unfinished[2].batch_ids, std::vector<std::string>{"b1"});
+}
+
+TEST_F(Claims, ABatchThatIsAcceptedComesWithTheJobAsTheRecordHasItAndARepeatSaysThatItIsOne) {
+  const StoredBatch batch = test::batch_of("b1");
+  StoredJob asked = test::job_of("b1");
+  asked.level = "M3";
+  asked.created_at = 1700000000;
+  const AcceptedJob made = demand(one_->add_batch(batch, asked)), again = demand(other_->add_batch(batch, asked));
+  const StoredJob stored = demand(other_->job(made.id));
+  EXPECT_FALSE(made.is_repeat);
+  EXPECT_TRUE(again.is_repeat);
+  for (const StoredJob& one : {StoredJob(made), StoredJob(again)}) {
+    EXPECT_EQ(one.id, stored.id);
+    EXPECT_EQ(one.cell, stored.cell);
+    EXPECT_EQ(one.batch_ids, stored.batch_ids);
+    EXPECT_EQ(one.level, "M3");
+    EXPECT_EQ(one.created_at, stored.created_at);
+    EXPECT_EQ(one.state, stored.state);
+    EXPECT_EQ(one.kind, stored.kind);
+  }
+  EXPECT_EQ(demand(one_->batch("cell-7", "b1")).csv, batch.csv);
+  EXPECT_EQ(demand(one_->batch_record("cell-7", "b1")).poses, batch.poses);
+  const StoredBatch other_content = test::batch_of("b1", "other", "client:2");
+  EXPECT_EQ(other_->add_batch(other_content, asked).error().code, ErrorCode::kConflict);
+  EXPECT_EQ(demand(one_->unfinished_jobs()).size(), 1U);
+  EXPECT_FALSE(demand(one_->audit()).broken);
 }
 
 TEST_F(Claims, AServerTakesUpItsOwnJobThatItLeftBehind) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <set>
 
 #include "server/base/hash.h"
 #include "server/store/database/postgres_database.h"
@@ -30,10 +31,15 @@ class Servers : public testing::Test {
     store->works_as(server);
     return store;
   }
-  /// It says that it is there with these files of cell-7, and compares them.
-  static Disputes arrive(Store& store, const CellDescription& files, bool starts = true) {
+  /// It says that it is there with these files of cell-7, compares them, and says what came of it.
+  static Disputes arrive(Store& store, const CellDescription& files, bool starts = true,
+                         const std::set<std::string>& agreed = {}) {
     EXPECT_TRUE(store.tell_presence(here(files)));
-    return demand(store.agree_on_cells({{"cell-7", files}}, starts));
+    auto disputes = demand(store.agree_on_cells({{"cell-7", files}}, starts, agreed));
+    ServerSelf self = here(files);
+    self.cells["cell-7"].is_apart = !disputes.empty() && agreed.empty();
+    EXPECT_TRUE(store.tell_presence(self));
+    return disputes;
   }
   static ServerSelf here(const CellDescription& files, int version = 1) {
     ServerSelf self{"", "host-a", 7, "0.1.0", true, true, {}, 0};
@@ -139,6 +145,40 @@ TEST_F(Servers, TheFilesOfACellChangeServerByServerWithoutACommand) {
   other_ = open("other");
   EXPECT_EQ(arrive(*other_, kOtherRobot), Disputes()) << "all that are there have the new one";
   EXPECT_EQ(arrive(*one_, kOtherRobot, false), Disputes());
+  EXPECT_EQ(record_goes_by(), "other");
+}
+
+TEST_F(Servers, OfThreeServersTheLastOneWithTheOldFileKeepsNobodyFromTheNewOneAndGoesOnAnswering) {
+  const auto third = open("third");
+  for (Store* store : {one_.get(), other_.get(), third.get()}) EXPECT_EQ(arrive(*store, kFirst), Disputes());
+  one_ = open("one");
+  EXPECT_TRUE(arrive(*one_, kOtherRobot).contains("cell-7")) << "two have the old one";
+  other_ = open("other");
+  EXPECT_EQ(arrive(*other_, kOtherRobot), Disputes()) << "most of those that are there want the new one";
+  EXPECT_EQ(arrive(*one_, kOtherRobot, false), Disputes());
+  const std::set<std::string> agreed = {"cell-7"};
+  for (int look = 0; look < 2; ++look) {
+    const auto disputes = arrive(*third, kFirst, false, agreed);
+    ASSERT_TRUE(disputes.contains("cell-7"));
+    EXPECT_NE(disputes.at("cell-7").find("third answers with the model that it has"), std::string::npos)
+        << disputes.at("cell-7");
+  }
+  EXPECT_EQ(record_goes_by(), "other") << "it wants nothing back";
+}
+
+TEST_F(Servers, WhoWasLeftWithTheFormerFileDoesNotBringItBackNorHelpsAnyoneElseTo) {
+  const auto third = open("third");
+  for (Store* store : {one_.get(), third.get()}) EXPECT_EQ(arrive(*store, kFirst), Disputes());
+  EXPECT_TRUE(arrive(*other_, kOtherRobot).contains("cell-7"));
+  ASSERT_TRUE(describe_cell(url_, "cell-7", "other", "anna"));
+  EXPECT_EQ(arrive(*other_, kOtherRobot, false), Disputes());
+  const std::set<std::string> agreed = {"cell-7"};
+  for (Store* store : {one_.get(), third.get()})
+    EXPECT_TRUE(arrive(*store, kFirst, false, agreed).contains("cell-7")) << "two of three have the former one";
+  ASSERT_TRUE(other_->take_leave());
+  EXPECT_TRUE(arrive(*one_, kFirst, false, agreed).contains("cell-7")) << "nor now that nobody has the new one";
+  const auto fourth = open("fourth");
+  EXPECT_TRUE(arrive(*fourth, kFirst).contains("cell-7")) << "those two serve, and want nothing";
   EXPECT_EQ(record_goes_by(), "other");
 }
 

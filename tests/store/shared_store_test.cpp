@@ -311,6 +311,24 @@ TEST_F(SharedStoreAway, ACommitThatTheStandbyHasNotConfirmedIsNoAcknowledgementA
   EXPECT_EQ(demand(store->unfinished_jobs()).size(), 1u);
 }
 
+TEST_F(SharedStoreAway, AHeartbeatWaitsForNoStandby) {
+  const auto store = open();
+  store->works_as("one");
+  const std::int64_t job = demand(store->add_batch(batch_of("lt-07"), job_of("lt-07"))).id;
+  ASSERT_TRUE(store->set_job_running(job));
+  ASSERT_TRUE(store->tell_presence({}));
+  const auto standbys = [&](const char* names) {
+    postgres_.sql(url_, fmt::format("ALTER SYSTEM SET synchronous_standby_names = '{}'", names));
+    postgres_.sql(url_, "SELECT pg_reload_conf()");
+  };
+  standbys("nobody");
+  const std::jthread asks([&] { static_cast<void>(store->add_batch(batch_of("lt-08"), job_of("lt-08"))); });
+  while (postgres_.sql(url_, "SELECT count(*) FROM pg_stat_activity WHERE wait_event = 'SyncRep'") == "0\n") continue;
+  EXPECT_TRUE(demand(store->renew_claim(job)).is_held);
+  EXPECT_TRUE(store->tell_presence({}));
+  standbys("");
+}
+
 TEST_F(SharedStoreAway, TheRecordGoesBeforeACopyOfAHistoryThatIsNoMore) {
   {
     const auto store = open();

@@ -435,11 +435,36 @@ void train_first(const Fleet& fleet, History& history) {
   }
 }
 
-void end(Fleet& fleet, const KillPlan& plan, Load& load, History& history, KillOutcome& outcome) {
+/// How long the jobs of a cell waited since then (Unix time, s) though nobody worked for it.
+void add_idle_times(const Fleet& fleet, std::int64_t since, KillOutcome& outcome) {
+  const auto rows = fleet.rows(fmt::format(
+      "WITH gaps AS (SELECT cell, started_at - GREATEST(created_at, {0}, COALESCE(MAX(finished_at) OVER (PARTITION BY "
+      "cell ORDER BY started_at, id ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING), 0)) AS gap "
+      "FROM jobs JOIN job_times ON job_times.job = jobs.id WHERE started_at >= {0}) "
+      "SELECT MAX(GREATEST(gap, 0)), SUM(GREATEST(gap, 0)) FROM gaps GROUP BY cell",
+      since));
+  for (const auto& row : rows) {
+    outcome.longest_idle_s = std::max(outcome.longest_idle_s, std::stod(row.at(0)));
+    outcome.idle_s = std::max(outcome.idle_s, std::stod(row.at(1)));
+  }
+}
+
+void wait_for_jobs(const Fleet& fleet, const KillPlan& plan, KillOutcome& outcome) {
+  const std::int64_t since = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  const std::int64_t begin = monotonic_us();
   const auto open_jobs = [&] {
-    return fleet.rows("SELECT 1 FROM jobs WHERE state NOT IN ('done', 'failed') LIMIT 1").empty();
+    return static_cast<int>(fleet.rows("SELECT 1 FROM jobs WHERE state NOT IN ('done', 'failed')").size());
   };
-  static_cast<void>(wait_until(open_jobs, plan.until_jobs_end));
+  outcome.jobs = static_cast<int>(fleet.rows("SELECT 1 FROM jobs").size());
+  outcome.left_over = open_jobs();
+  static_cast<void>(wait_until([&] { return open_jobs() == 0; }, plan.until_jobs_end));
+  outcome.open = open_jobs();
+  outcome.jobs_ended_s = static_cast<double>(monotonic_us() - begin) / 1e6;
+  add_idle_times(fleet, since, outcome);
+}
+
+void end(Fleet& fleet, const KillPlan& plan, Load& load, History& history, KillOutcome& outcome) {
+  wait_for_jobs(fleet, plan, outcome);
   for (const AskedCell& cell : fleet.cells()) {
     for (const std::size_t client : {std::size_t{1}, std::size_t{2}}) load.client(client).read_models(cell.name);
     history.add(end_of(fleet, cell.name));

@@ -35,7 +35,14 @@ struct KillOutcome {
   std::vector<double> after_database_s, after_server_s;  ///< from the loss until a change was acknowledged again
   std::vector<double> after_ready_s;                     ///< from when the database was back
   int given_up = 0;                                      ///< jobs that three servers died of
-  int served_otherwise = 0;                              ///< servers that in the end do not serve what is in force
+  int jobs = 0;                                          ///< all that there were
+  int left_over = 0;                                     ///< that waited still when the last kill was over
+  int open = 0;                                          ///< that have not ended in the time that they were given
+  double jobs_ended_s = 0;                               ///< from the last kill until all had ended
+  /// Since then: how long jobs of a cell waited that nobody worked for, the longest time and the sum, of the worst
+  /// cell.
+  double longest_idle_s = 0, idle_s = 0;
+  int served_otherwise = 0;  ///< servers that in the end do not serve what is in force
   bool trail_whole = false;
 };
 

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <sstream>
 #include <vector>
 
 #include "server/store/store_init.h"
@@ -87,6 +88,8 @@ void Postgres::start_until(const std::string& line) {
   auto command =
       as_its_user({program("postgres"), "-D", data(), "-k", folder_.path().string(), "-c", "listen_addresses=", "-c",
                    disk_ == Disk::kWaitedFor ? "fsync=on" : "fsync=off", "-c", "max_connections=60"});
+  if (port_ != 0)
+    command.insert(command.end(), {"-c", "listen_addresses=127.0.0.1", "-c", "ssl=on", "-p", std::to_string(port_)});
   if (disk_ == Disk::kSmall) {
     // Mounted for the server alone: it goes with it.
     constexpr const char* kMounted =
@@ -131,13 +134,62 @@ void Postgres::freeze(bool frozen) const {
 }
 
 std::string Postgres::url(const std::string& database, const std::string& role) const {
-  return fmt::format("postgresql://{}@/{}?host={}", role, database, folder_.path().string());
+  return fmt::format("postgresql://{}@/{}?host={}{}", role, database, folder_.path().string(),
+                     port_ == 0 ? "" : fmt::format("&port={}", port_));
+}
+
+void Postgres::take_certificates(std::uint16_t port) {
+  constexpr const char* kMake =
+      "set -e; mkdir \"$0\"; cd \"$0\"; ec='-newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes'; "
+      "for ca in ca other-ca; do openssl req -x509 $ec -keyout $ca.key -out $ca.crt -days 2 -subj /CN=$ca; done; "
+      "sign() { openssl req $ec -keyout $1.key -out $1.csr -subj /CN=$2 -addext subjectAltName=DNS:$2; "
+      "openssl x509 -req -in $1.csr -CA ca.crt -CAkey ca.key -CAcreateserial -copy_extensions copy -days 2 -out "
+      "$1.crt; }; "
+      "sign server localhost; sign keeper keeper; "
+      "cp server.crt server.key ../data; cp ca.crt ../data/root.crt; chmod 600 ../data/server.key";
+  const Finished made = run({"/bin/bash", "-c", kMake, certificates()}, kPatience);
+  if (made.exit_code != 0) give_up(made.err);
+  for (const char* file : {"data/server.crt", "data/server.key", "data/root.crt"}) give_to_its_user(folder_.file(file));
+  stop();
+  port_ = port;
+  folder_.write("data/pg_hba.conf", "local all all trust\nhostssl all all 127.0.0.1/32 cert\n");
+  folder_.write("data/postgresql.auto.conf", "ssl_ca_file = 'root.crt'\n");
+  start();
+}
+
+std::string Postgres::certified_url(const std::string& database, const std::string& role) const {
+  return fmt::format(
+      "postgresql://{}@localhost:{}/{}?sslmode=verify-full&sslrootcert={}/ca.crt&sslcert={}/keeper.crt&sslkey={}/"
+      "keeper.key",
+      role, port_, database, certificates(), certificates(), certificates());
 }
 
 std::string Postgres::sql(const std::string& url, const std::string& statement) const {
   const Finished said = run({program("psql"), url, "-v", "ON_ERROR_STOP=1", "-qAtc", statement}, kPatience);
   if (said.exit_code != 0) give_up(said.err);
   return said.out;
+}
+
+void Postgres::write_down(const std::string& url) const {
+  const std::string name = sql(url, "SELECT current_database()");
+  sql(url, fmt::format("ALTER DATABASE {} SET log_statement = 'all'", name.substr(0, name.find('\n'))));
+}
+
+std::vector<std::string> Postgres::asked() {
+  const std::string mark = fmt::format("SELECT 'mark {}'", ++marks_);
+  sql(url("postgres") + "&options=-clog_statement%3Dall", mark);
+  if (!server_->wait_for_line(mark, kPatience)) give_up("does not write down what it is asked");
+  const std::string log = server_->standard_error();
+  std::vector<std::string> asked;
+  std::istringstream lines(log.substr(read_of_log_));
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t simple = line.find("LOG:  statement: "), bound = line.find("LOG:  execute ");
+    if (simple == std::string::npos && bound == std::string::npos) continue;
+    asked.push_back(line.substr(line.find(": ", line.find("LOG:  ") + 6) + 2));
+  }
+  read_of_log_ = log.size();
+  std::erase_if(asked, [](const std::string& text) { return text.find("'mark ") != std::string::npos; });
+  return asked;
 }
 
 std::string Postgres::new_database() {

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
@@ -29,6 +31,18 @@ class Postgres {
   [[nodiscard]] std::string url(const std::string& database, const std::string& role = "postgres") const;
   /// What a statement says in that database, a line a row; aborts where it fails.
   std::string sql(const std::string& url, const std::string& statement) const;
+  /// What the clients of that database that connect from now on ask of it is written down.
+  void write_down(const std::string& url) const;
+  /// What was asked of it since this was called last, a text for each way of a client to the server and back.
+  [[nodiscard]] std::vector<std::string> asked();
+
+  /// From now on it is at `localhost` on that port, too, with TLS and for who has a certificate of his role alone.
+  void take_certificates(std::uint16_t port);
+  /// By that way, as libpq's most careful: the name and the certificate of the server are compared, and the client
+  /// shows its own. The role `keeper` has one.
+  [[nodiscard]] std::string certified_url(const std::string& database, const std::string& role = "keeper") const;
+  /// In this folder: `ca.crt`, `other-ca.crt`, `keeper.crt`, `keeper.key`.
+  [[nodiscard]] std::string certificates() const { return folder_.file("certificates"); }
 
   void start();
   void stop();
@@ -50,7 +64,10 @@ class Postgres {
   TemporaryFolder folder_;
   const Disk disk_;
   std::optional<Process> server_;
+  std::uint16_t port_ = 0;  // on which it takes certificates; 0: it takes none
   int databases_ = 0;
+  int marks_ = 0;
+  std::size_t read_of_log_ = 0;
 };
 
 }  // namespace trammel::test

@@ -52,6 +52,30 @@ TEST_F(SharedHistory, ARollbackStepsPastNoVersionThatOnlyCannotBeReadNow) {
   EXPECT_EQ(served(), 2);
 }
 
+TEST_F(SharedHistory, AModelThatIsJudgedWhileOthersDecideAllTheTimeIsTriedAgainAndHasNotFailed) {
+  const auto other = demand(Store::open(url_));
+  const CompensatedModel made = test::nominal_model(cells_.at("cell-7"), 4);
+  StoredJob asked;
+  asked.cell = "cell-7";
+  asked.batch_ids = {"b1"};
+  asked = demand(store_->add_batch({"cell-7", "b1", "q1_deg\n", "hash", "client:1", 1700000000, 1}, asked));
+  ASSERT_TRUE(store_->set_job_running(asked.id));
+  const CellBook cells(cells_);
+  ModelRegistry registry;
+  ModelHistory history(cells, *store_, registry);
+  bool changes = true;
+  const Judging judging = [&](const Opponents&) -> Result<GateVerdict> {
+    const int now = demand(other->version_in_force("cell-7")).value_or(0);
+    if (changes) EXPECT_TRUE(other->activate("cell-7", now == 2 ? 3 : 2));
+    return GateVerdict{true, "better"};
+  };
+  const auto refused = history.keep({made, asked}, judging);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kBusy) << sentence(refused.error());
+  changes = false;
+  EXPECT_EQ(demand(history.keep({made, asked}, judging)).version, 4);
+}
+
 TEST_F(SharedHistory, WhatIsInForceOfEachCellIsAnnouncedFromOneLook) {
   EXPECT_EQ(registry_.version_in_force("cell-7"), 3);
   EXPECT_EQ(served(), 3);

@@ -162,12 +162,19 @@ std::string why_not_connected(PGconn* connection) {
   return "";
 }
 
+/// Certificates and keys do not mend themselves. Of a line that breaks during the handshake none of this is said.
+bool is_of_certificates(const std::string& told) {
+  constexpr std::array kWords = {"certificate", "private key", "alert unknown ca", "does not support SSL"};
+  return std::any_of(kWords.begin(), kWords.end(),
+                     [&](const char* word) { return told.find(word) != std::string::npos; });
+}
+
 /// A server that answered and lets nobody in now will do so later; any other refusal is for good. Of a connection that
-/// is not there libpq has no SQLSTATE, so these are the server's own words.
+/// is not there libpq has no SQLSTATE, so these are the server's own words, and libpq's.
 bool is_refused_for_good(PGconn* connection, const std::string& told) {
   if (::PQconnectionNeedsPassword(connection) != 0) return true;
   const std::size_t at = told.find("FATAL:");
-  if (at == std::string::npos) return false;
+  if (at == std::string::npos) return is_of_certificates(told);
   const auto says = [answer = told.substr(at)](const char* text) { return answer.find(text) != std::string::npos; };
   // The last four are a pooler's, whose server is away.
   constexpr std::array kForNow = {
@@ -315,12 +322,16 @@ bool PostgresDatabase::hears(milliseconds limit) {
   if (lost_) lose("");
   if (is_ready(::PQsocket(connection_.get()), POLLIN, std::chrono::steady_clock::now() + limit))
     check_sent(::PQconsumeInput(connection_.get()));
-  bool heard = false;
+  return take_words();
+}
+
+bool PostgresDatabase::take_words() {
+  bool any = false;
   while (PGnotify* word = ::PQnotifies(connection_.get())) {
-    heard = true;
+    any = true;
     ::PQfreemem(word);
   }
-  return heard;
+  return any;
 }
 
 Rows PostgresDatabase::run(const char* sql, Values values) {
@@ -340,6 +351,7 @@ bool PostgresDatabase::has_table(const std::string& name) {
 
 void PostgresDatabase::begin(bool writes) {
   takes_long_ = false;
+  static_cast<void>(take_words());  // of a session that listened before a pooler gave it to this one
   execute(fmt::format("BEGIN ISOLATION LEVEL {}; {}",
                       writes ? "READ COMMITTED READ WRITE" : "REPEATABLE READ READ ONLY", kLimits));
 }

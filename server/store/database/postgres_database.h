@@ -54,6 +54,8 @@ class PostgresDatabase final : public Database {
   [[nodiscard]] Answer answer(Deadline deadline);
   [[nodiscard]] Deadline by_when(std::chrono::milliseconds limit) const;
   void wait(short events, Deadline deadline);
+  /// Forgets the words that came; whether there were any.
+  bool take_words();
   [[noreturn]] void lose(const std::string& why);
   void check_sent(int sent);
 
