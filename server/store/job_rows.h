@@ -12,7 +12,7 @@
 /// Jobs as rows, for the transactions of batches, jobs and models.
 namespace trammel {
 
-/// Jobs are told apart from batches by their numbers, which need not be bound: `1, 2, 3`.
+/// Numbers as SQL lists them, `1, 2, 3`: they need not be bound.
 [[nodiscard]] std::string list_of(const std::set<std::int64_t>& ids);
 
 /// As the table of jobs holds it, whose CHECK is of before there were checks: those stand in health_checks, too.
