@@ -47,7 +47,7 @@ class BaseYielding final : public ErrorSource {
     if (jacobian == nullptr) return;
     const StateRows& rows = jacobian->rows;
     StateMatrix<3> by_state = yielding * kinematics.base_moment_jacobian();
-    // A rotation of B before turns its axes, too.
+    // An earlier rotation of B turns these axes, too.
     by_state.block<3, 3>(0, rows.base(3)) += yielding * skew(moment) - skew(tilt);
     const Matrix3 left = left_jacobian(tilt);
     jacobian->pass_on({rows.base(3), rows.base(4), rows.base(5)}, turn.transpose() * left * by_state);

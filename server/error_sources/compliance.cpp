@@ -98,7 +98,7 @@ class ComplianceEquilibrium final : public Compliance {
       if (moved < kEquilibriumStep) break;
     }
     if (jacobian == nullptr) return;
-    // Of the gears: dg = C tau + C T (dq + ds), dq = B dg: (I - C T_q B) dg = tau dC + C T_s ds, T the torque's
+    // For the gears: dg = C tau + C T (dq + ds), dq = B dg: (I - C T_q B) dg = tau dC + C T_s ds, T the torque's
     // derivative in the loaded posture, B the bars.
     const ArmKinematics loaded(state);
     const JointArray torque = loaded.gravity_torque();

@@ -47,7 +47,7 @@ class Geometry final : public ErrorSource {
   }
 
  private:
-  /// A zero is its gear's, counted as the axis turns: what bars couple goes with it.
+  /// A zero belongs to its gear and is counted as the axis turns: joints that bars couple go with it.
   static void add_to_zero(int joint, double value, ArmState& state, StateJacobian* jacobian, int column) {
     const double sign = state.chain->joint(joint).sign;
     state.add_to_joint(joint, sign * value);

@@ -15,7 +15,7 @@ constexpr double kShortestWay = 1e-3;
 /// Friction in a gear holds the joint back, by as much as it was moved to get there: delta q = -h m / sqrt(m^2 + w^2),
 /// m = q - q_before. Long moves end in `backlash`, a step by the side alone; moves shorter than w leave less. The pose
 /// before is all that it remembers. h is not negative: friction never takes a joint farther than it was sent. Where
-/// nobody knows that pose there is none: its mean over both sides.
+/// nobody knows that pose there is no hysteresis, which is its mean over both sides.
 class Hysteresis final : public ErrorSource {
  public:
   explicit Hysteresis(const SourceSpec& spec)

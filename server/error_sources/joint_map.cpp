@@ -74,7 +74,7 @@ class JointMap final : public ErrorSource {
   std::vector<Parameter> parameters_;
 };
 
-/// Empty where the numbers are none.
+/// The spectrum that these numbers say; empty where they say none.
 std::optional<MapSpectrum> spectrum_of(const std::vector<double>& numbers) {
   MapSpectrum spectrum;
   if (numbers.empty()) return spectrum;
@@ -104,12 +104,12 @@ Result<ErrorSourcePtr> make(const SourceSpec& spec, const Cell& cell) {
   return std::make_shared<JointMap>(spec, *spectrum);
 }
 
-/// With four significant digits and no exponent, whose sign would end the number.
+/// The number with four significant digits. It has no exponent, since the sign of one would end the number.
 std::string in_digits(double value) {
   return fmt::format("{:.{}f}", value, std::clamp(3 - static_cast<int>(std::floor(std::log10(value))), 0, 12));
 }
 
-/// Whether it spells a map of a joint.
+/// True where `spelling` is a map of a joint.
 bool is_map(const std::string& spelling) {
   return spelling.starts_with(fmt::format("{}:", causes::joint_map().spelling));
 }

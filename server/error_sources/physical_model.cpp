@@ -8,8 +8,8 @@ namespace trammel {
 
 namespace {
 
-/// The pose as its causes see it: with the angles of the gears, where the controller counts others. What was recorded
-/// of approach directions is of the gears already.
+/// The pose as its causes see it: with the angles of the gears, where the controller counts other angles. Recorded
+/// approach directions are those of the gears already.
 class AtTheGears {
  public:
   AtTheGears(const Chain& robot, const PoseContext& context) : context_(&context) {
@@ -128,7 +128,7 @@ constexpr std::size_t kMostSources = 500;
 constexpr std::size_t kMostSpecBytes = 1000;
 constexpr std::size_t kMostParameters = 1300;  // their covariance has the square of it
 
-/// Before anything is made of them.
+/// Refuses too many sources and spellings that are too long, before anything is made of them.
 Status check_counts(const std::vector<std::string>& specs) {
   if (specs.size() > kMostSources)
     return failure(ErrorCode::kTooLarge, "{} error sources, limit {}", specs.size(), kMostSources)

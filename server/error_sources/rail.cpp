@@ -21,7 +21,7 @@ double travel_of(const Joint& joint) {
   return std::isfinite(travel) ? travel : 1;
 }
 
-/// What the carriage has travelled is not what rack or scale says: delta q = k q. The constant is the rail's zero.
+/// The carriage travels another distance than rack or scale says: delta q = k q. The constant is the rail's zero.
 class RailScale final : public JointError {
  public:
   explicit RailScale(const SourceSpec& spec)

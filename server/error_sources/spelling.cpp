@@ -21,7 +21,7 @@ using causes::Scope;
 
 constexpr double kMostPoses = 1e6;  // in a batch, for steps
 
-/// Names of causes in models and cell files from before 2026-11-23.
+/// Older names of causes, in models and cell files from before 2026-11-23.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kFormerNames = {
     {{"link_weights", "self_weight"}, {"base_yielding", "base_compliance"}}};
 
@@ -172,7 +172,7 @@ bool corrects(const std::vector<std::string>& sources, causes::Part part) {
 
 namespace {
 
-/// What stands behind the cause: `:3`, `:d6`, `@40`.
+/// The cause with its parts in words: joint, number and place stand behind it as `:3`, `:d6`, `@40`.
 std::string in_words(const CauseRecord& record, const std::string& spelling) {
   const std::size_t at = spelling.find('@');
   const std::size_t colon = spelling.substr(0, at).find(':');

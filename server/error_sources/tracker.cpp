@@ -8,8 +8,8 @@ namespace {
 
 constexpr double kSecondsPerHour = 3600;
 
-/// From a pose on, the tracker stands elsewhere: everything it sees has moved as one. Told by the base moving in W,
-/// with its rotation about the origin of B.
+/// From a pose on, the tracker stands elsewhere: everything it sees has moved as one. It is described as
+/// the base moving in W, with its rotation about the origin of B.
 class TrackerMoved final : public ErrorSource {
  public:
   explicit TrackerMoved(const SourceSpec& spec) : name_(spec.text), first_(static_cast<int>(spec.at[0]) - 1) {

@@ -17,7 +17,7 @@ constexpr double kAsIfRobots = 3;   // of a parameter's kind, that are added to 
 constexpr double kCorrelated = 10;  // likewise, without any correlation
 constexpr int kRounds = 60;
 
-/// What one robot's own poses say of the parameters: information and information times value, in prior scales.
+/// The message of one robot's own poses on the parameters: information, and information times value, in prior scales.
 struct Said {
   Eigen::MatrixXd information;
   Eigen::VectorXd weighted;
@@ -73,8 +73,7 @@ struct Learned {
   Eigen::MatrixXd deviations;  ///< robots x P, expected
 };
 
-/// A parameter among those of its kind: their spreads are alike, of quantities that cannot be below 0 in shares of
-/// their means.
+/// Parameters of one kind have similar spreads. For quantities that cannot be below 0 these are shares of their means.
 struct Kind {
   std::string unit;
   bool positive = false;
@@ -227,7 +226,7 @@ std::vector<Unlike> unlike_twins(const std::vector<IdentifiedParameter>& paramet
     const IdentifiedParameter& one = parameters[k];
     const FleetParameter* twin = fleet.find(one.parameter.name);
     if (twin == nullptr || one.parameter.is_place) continue;
-    // Its posterior without its own prior, all else as it is: the cavity of expectation propagation.
+    // Its posterior without its own prior, everything else unchanged: the cavity of expectation propagation.
     const double posterior = 1 / covariance(static_cast<Index>(k), static_cast<Index>(k));
     const double prior = 1 / (one.parameter.prior_scale * one.parameter.prior_scale);
     const double said = posterior - prior;

@@ -11,7 +11,7 @@ constexpr double kNegligible = 1e-12;  // share of the noncentral mixture that m
 constexpr double kCertain = 8.3;       // standard deviations: 1 to rounding
 constexpr int kMostTerms = 20000;
 
-/// What two more degrees of freedom add to the tail: (x/2)^(k/2) e^(-x/2) / Gamma(k/2 + 1).
+/// Two more degrees of freedom add this to the tail: (x/2)^(k/2) e^(-x/2) / Gamma(k/2 + 1).
 double added_by_two(double x, double freedom) {
   return x <= 0 ? 0 : std::exp(0.5 * freedom * std::log(0.5 * x) - 0.5 * x - std::lgamma(0.5 * freedom + 1));
 }
@@ -29,7 +29,8 @@ double chi_square_tail(double x, int freedom) {
 // A mixture of central ones with 2j degrees of freedom more, j from Poisson's distribution.
 double chi_square_tail(double x, int freedom, double noncentrality) {
   if (!(noncentrality > 0)) return chi_square_tail(x, freedom);
-  // Along the shift alone: less than x has at most the chance of a normal number below sqrt(x) - sqrt(noncentrality).
+  // Bound: along the shift alone, a value below x is at most as likely as a normal number below
+  // sqrt(x) - sqrt(noncentrality).
   if (std::sqrt(noncentrality) - std::sqrt(std::max(x, 0.0)) > kCertain) return 1;
   const double mean = 0.5 * noncentrality;
   const int first = std::max(0, static_cast<int>(mean - 10 * std::sqrt(mean) - 10));

@@ -33,8 +33,8 @@ std::optional<VectorXd> InverseRoot::append(const VectorXd& covariance, double v
   return fresh;
 }
 
-// Each later row is rotated with the row of `point` until the column of the point is empty below it. What gathers in
-// the row of the point is r.
+// Each later row is rotated with the row of `point` until the column of the point is empty below it. The row of the
+// point gathers r.
 VectorXd InverseRoot::remove(Index point) {
   VectorXd gathered = VectorXd::Zero(size_);
   gathered.head(point + 1) = row(point);

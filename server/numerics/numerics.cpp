@@ -9,8 +9,8 @@ namespace trammel {
 
 namespace {
 
-/// Whether TRAMMEL_NUMERICS asks for an older processor than `build` is for: results of another machine can be had
-/// here.
+/// True where TRAMMEL_NUMERICS asks for an older processor than `build` is for. This gives the results of an older
+/// machine.
 bool is_too_new(std::string_view build) {
   const char* said = std::getenv("TRAMMEL_NUMERICS");
   if (said == nullptr) return false;

@@ -31,7 +31,7 @@ JointVector start_of(const Chain& robot, const JointVector& q, const Sides& side
   return start;
 }
 
-/// Whether the gear of the joint has way enough from `start` to `q` to take up its play on this side.
+/// True where the gear of the joint turns far enough from `start` to `q` to take up its play on this side.
 bool has_way(const Chain& robot, const JointVector& q, const JointVector& start, int joint, int side) {
   return side * robot.gear_angles(q - start)(joint) >= kLeastBump * longest_way(robot.joint(joint));
 }

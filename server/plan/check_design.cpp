@@ -14,7 +14,7 @@ constexpr double kWeakPrior = 1e-6;  // of base and tool, per squared sigma: so 
 constexpr int kRounds = 3;           // of exchanges
 constexpr double kLeastGain = 1e-3;  // of the criterion
 
-/// What base and tool (f columns) and the signals (s columns) do at one pose, over sigma.
+/// Effects at one pose, over sigma: of base and tool (f columns) and of the signals (s columns).
 struct Whitened {
   Eigen::MatrixXd frames;   // R x f
   Eigen::MatrixXd signals;  // R x s
@@ -107,7 +107,7 @@ void exchange(const Criterion& criterion, const std::vector<Whitened>& poses, Su
   }
 }
 
-/// lambda at which a test of so many numbers sees a signal.
+/// The lambda at which a test of so many numbers sees a signal.
 double needed_strength(int freedom, const CheckTest& test) {
   const double size = smallest_seen({1.0e12}, freedom, test.false_alarm, test.power).value_or(1e-6);
   return size * size * 1e12;

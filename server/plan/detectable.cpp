@@ -18,7 +18,7 @@ constexpr double kLeastEffect = 1e-7;                    // m, of one prior scal
 constexpr double kLeastShare = 0.01;                     // of an effect: less is a motion of base and tool
 constexpr double kLowestOrder = 1, kHighestOrder = 120;  // cycles a turn, of a function of an angle
 
-/// Of a normal distribution, by Box and Muller.
+/// A number of the normal distribution, by Box and Muller.
 double normal(SeededRandom& random) {
   const double radius = std::sqrt(-2 * std::log(random.uniform(1e-300, 1)));
   return radius * std::cos(2 * kPi * random.uniform(0, 1));

@@ -13,7 +13,7 @@ namespace trammel {
 
 namespace {
 
-// What the controllers take.
+// Limits of the controllers.
 constexpr std::size_t kRapidName = 32;   // letters of a RAPID identifier
 constexpr std::size_t kKrlName = 24;     // letters of the name of a KRL program
 constexpr int kKrlTools = 16;            // tools in $TOOL_DATA
@@ -28,7 +28,7 @@ bool is_name(const std::string& text, std::size_t longest) {
          std::all_of(text.begin(), text.end(), allowed);
 }
 
-/// With a prefix, so that it is no reserved word and none of the names inside.
+/// The name with a prefix, so that it is no reserved word and none of the names inside.
 std::string module_name(const std::string& name) {
   std::string text = "T_" + name;
   for (char& c : text) {

@@ -35,7 +35,7 @@ class GrowingDeterminant {
   }
   [[nodiscard]] double value() const { return log_det(information_); }
 
-  /// What each candidate would add: log det(I + J M⁻¹ Jᵀ), the rank-R update of a determinant.
+  /// The gain of each candidate: log det(I + J M⁻¹ Jᵀ), the rank-R update of a determinant.
   [[nodiscard]] Eigen::VectorXd gains() const {
     const Eigen::LLT<Eigen::MatrixXd> factor(information_);
     const Eigen::MatrixXd whitened = factor.matrixL().solve(columns_);

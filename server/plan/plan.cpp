@@ -53,7 +53,7 @@ constexpr int kCandidatesForEachPose = 4;  // at least: of fewer a choice is har
 constexpr int kLargestFactor = 512;       // of poses: fewer than 1 in 1000 fits then
 constexpr int kLargestDesignFactor = 64;  // of candidates: they are more already, and each is linearised
 
-/// What the cell allows, asked for every tool that will be used.
+/// The poses that the cell allows, for every tool that will be used.
 class Filter {
  public:
   static Result<Filter> of(const Cell& cell, const std::vector<std::string>& tools) {
@@ -66,7 +66,7 @@ class Filter {
     return filter;
   }
 
-  /// Whether the candidate may be planned, approached in each of these ways; counts it.
+  /// True where the candidate may be planned and approached in each of these ways. Counts the candidate.
   bool keeps(const JointVector& q, const std::vector<Sides>& ways, DrawCount& count) const {
     ++count.drawn;
     std::vector<JointVector> visited = {q};
@@ -85,7 +85,7 @@ class Filter {
  private:
   explicit Filter(const Cell& cell) : cell_(cell) {}
 
-  /// By the nominal robot.
+  /// Inside the workspace by the nominal robot.
   bool inside_workspace(const JointVector& q) const {
     if (!cell_.workspace) return true;
     const Pose X_BF = cell_.robot.flange_pose(q);
@@ -148,7 +148,7 @@ Status check_count(const PlanOptions& options) {
       .beyond(options.count, 1);
 }
 
-/// What all poses of a plan share.
+/// The settings that all poses of a plan share.
 struct Planning {
   std::shared_ptr<const Cell> cell;
   std::vector<std::string> tools, payloads;

@@ -46,7 +46,7 @@ Separability separability(const CausePair& pair, const Eigen::MatrixXd& informat
   left.diagonal().array() += 1;
 
   Separability result;
-  // Of one parameter when the others are free: 1 / (its posterior variance), less the prior's 1.
+  // The strength of one parameter while the others are free: 1 / (its posterior variance), less the prior's 1.
   const Eigen::VectorXd variance = left.llt().solve(Eigen::MatrixXd::Identity(left.rows(), left.rows())).diagonal();
   const std::vector<Parameter> parameters = pair.model.parameters();
   for (Eigen::Index k = 0; k < left.rows(); ++k) {

@@ -26,11 +26,12 @@ const causes::Rival* begun_before(const CauseRecord& whole, const std::string& p
   return nullptr;
 }
 
-/// Causes that can be another than they were while the instrument is as it should be.
+/// True for causes that may have changed while the instrument is as it should be.
 bool may_have_changed(const CauseRecord& record) {
   if (record.scope == Scope::kPose || record.scope == Scope::kSession || record.part == Part::kBase) return false;
   if (record.search == SearchFamily::kNone || record.search == SearchFamily::kPose) return false;
-  // Of a cause and its beginning at a pose one is asked for; of maps of an angle that of any function.
+  // A cause that always acts and the one that begins at a pose are asked for as one. Maps of an angle are asked for as
+  // "any function".
   return record.search != SearchFamily::kMap && begun_before(record, "", -1) == nullptr;
 }
 
@@ -62,12 +63,12 @@ bool warms(const std::vector<PoseContext>& poses, std::optional<double> learned_
   return low && *high - *low > kWarmer;
 }
 
-/// True where a temperature that is the same at all poses shows: all lengths are another.
+/// True where a temperature shows though it is the same at all poses, since all lengths differ.
 bool shows_alike_at_all(const CauseRecord& record) {
   return record.scope == Scope::kArm && record.needs.temperature && !record.needs.history;
 }
 
-/// What these poses would have to record; empty where the cause shows.
+/// The columns that these poses would have to record; empty where the cause shows.
 std::string lacking(const CauseRecord& record, int joint, const Cell& cell, const std::vector<PoseContext>& poses,
                     std::optional<double> learned_at) {
   const ContextNeeds& needs = record.needs;

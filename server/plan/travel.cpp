@@ -12,7 +12,7 @@ constexpr std::size_t kMostImproved = 1000;  // likewise, each part of the way t
 constexpr int kPasses = 20;
 constexpr double kGain = 1e-9;  // s: less is none
 
-/// s: of the joint that takes longest.
+/// s: the time of the joint that takes longest.
 double time_between(const Chain& robot, const JointVector& from, const JointVector& to) {
   double longest = 0;
   for (int j = 0; j < robot.size(); ++j)
@@ -48,7 +48,7 @@ class Tour {
     return time_between(robot_, poses_[from.last - 1].context.q, poses_[to.first].bump);
   }
 
-  /// Whether turning a part of the way round made it shorter.
+  /// Turns parts of the way round; true where that made it shorter.
   bool improve(std::vector<Stop>& stops, std::size_t first, std::size_t to) const {
     bool better = false;
     for (std::size_t a = first; a + 1 < to; ++a) {

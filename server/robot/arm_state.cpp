@@ -293,7 +293,8 @@ void ArmKinematics::add_first_moments(const LinkVectors& turn, JointStateMatrix&
     for (int j = 0; j <= i; ++j) {
       if (chain_->joint(j).type != JointType::kRevolute) continue;
       const Vector3& z = links_[static_cast<std::size_t>(j)].z;
-      // As of a body: a rotation upstream of the joint turns axis and moment together, one beyond it the moment alone.
+      // As for a body: a rotation before the joint turns axis and moment together, a rotation beyond it the moment
+      // alone.
       const Vector3 by_turn = z.cross(first.moment).cross(gravity);
       const Vector3 by_moment = gravity.cross(z);
       for (int row = 0; row < rows.theta(j); ++row) T(j, row) += by_turn.dot(turn.col(row));

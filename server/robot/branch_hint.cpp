@@ -17,7 +17,7 @@ bool take(std::string_view& text, std::string_view word) {
   return true;
 }
 
-/// The list at the front of `text`, which it is taken from; empty where none stands there.
+/// Takes the list from the front of `text`; empty where none stands there.
 std::vector<int> take_branches(std::string_view& text) {
   std::vector<int> branches;
   if (!take(text, kConf)) return {};

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kHashDigits = 32;
 
-/// Of a cell file: the robot file counts by what it says, and the rest is for people.
+/// Keys of a cell file that decide no number: the robot file counts by its content, and the others are for people.
 const std::set<std::string> kWithoutNumbers = {"robot", "robot_confirmed", "serial_number", "instrument", "operator"};
 
 /// `0.10` and `1e-1` are one number.
@@ -25,7 +25,7 @@ std::string spelled(const std::string& scalar) {
   return error == std::errc() && stopped == end ? fmt::format("{:.17g}", number) : scalar;
 }
 
-/// One spelling for whatever says the same; texts with their length, so that no two are spelled alike.
+/// One spelling for values that mean the same. Texts carry their length, so that no two texts are spelled alike.
 std::string spelled(const YAML::Node& node) {
   if (node.IsSequence()) {
     std::string text = "[";

@@ -191,7 +191,7 @@ double read_radius(const YamlMap& map, const std::string& key) {
   return from_mm(radius);
 }
 
-/// A point where no key says that it is a sphere, a plane or a ring.
+/// The shape of an anchor: a point, unless a key says that it is a sphere, a plane or a ring.
 void read_shape(const YamlMap& map, Anchor& anchor) {
   const bool sphere = map.has("sphere_radius_mm"), plane = map.has("plane_normal"), ring = map.has("ring_axis");
   if (sphere + plane + ring > 1)
@@ -411,7 +411,7 @@ void read_joint_ranges(const YamlMap& map, Cell& cell) {
 
 namespace {
 
-/// From 0, of a joint that is counted from 1. Chain::make() says whether the robot has it.
+/// The index from 0 of a joint that the file counts from 1. Chain::make() checks that the robot has it.
 int joint_index(const YamlMap& map, const std::string& key) {
   const int number = map.integer(key, 0);
   if (number < 1 || number > kMaxJoints)
@@ -432,7 +432,7 @@ namespace {
 
 constexpr double kShortestArm = 0.05;  // m, all lengths of its links together; no robot is smaller
 
-/// Refuses an arm that no robot is as small as.
+/// Refuses an arm that is smaller than any robot.
 void check_lengths(const YamlMap& map, const std::vector<Joint>& joints) {
   double sum = 0;
   bool rails = false;
@@ -490,7 +490,8 @@ Result<Cell> cell_with(const Result<Chain>& robot, const std::string& cell_yaml,
   });
 }
 
-/// Of a file that a file names. Nobody who starts a program knows that it would wait for a pipe there.
+/// The text of a file that another file names. Refuses a pipe: whoever starts a program does not know that it would
+/// wait there.
 Result<std::string> file_text_of(const std::string& path) {
   std::error_code unknown;
   if (std::filesystem::exists(path, unknown) && !std::filesystem::is_regular_file(path, unknown))
@@ -498,7 +499,7 @@ Result<std::string> file_text_of(const std::string& path) {
   return read_text_file(path);
 }
 
-/// Of the robot file that the cell names: relative to the cell file.
+/// The path of the robot file that the cell names, relative to the cell file.
 Result<std::string> robot_path_in(const std::string& cell_yaml, const std::string& path) {
   return read_yaml(cell_yaml, path, [](const YamlMap& map) { return map.text("robot"); })
       .map([&](const std::string& name) { return (std::filesystem::path(path).parent_path() / name).string(); });

@@ -18,7 +18,7 @@ constexpr double kReach = 1e-9;      // by how much a cosine may exceed 1 at the
 Matrix3 about_x(double angle) { return Eigen::AngleAxisd(angle, Vector3::UnitX()).toRotationMatrix(); }
 Matrix3 about_z(double angle) { return Eigen::AngleAxisd(angle, Vector3::UnitZ()).toRotationMatrix(); }
 
-/// Empty beyond 1.
+/// The angle with this cosine; empty beyond 1.
 std::optional<double> arc_cosine(double cosine) {
   if (std::abs(cosine) > 1 + kReach) return std::nullopt;
   return std::acos(std::clamp(cosine, -1.0, 1.0));

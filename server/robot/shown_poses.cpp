@@ -29,7 +29,7 @@ double rounding_of(const std::vector<double>& values) {
   return step;
 }
 
-/// What the last digits that are shown may move, one standard deviation.
+/// How far rounding to the digits that are shown may move joints and position, one standard deviation.
 struct Rounding {
   JointArray joints;    // rad (m)
   double position = 0;  // m
@@ -53,7 +53,7 @@ Rounding rounding(const Chain& robot, const ShownPoses& shown) {
   return rounding;
 }
 
-/// Where the poses are shown, and of what.
+/// The frame in which poses are shown, and the tool that they are of.
 struct Frames {
   std::string name;
   Pose X_SB = Pose::Identity();  // S: the frame in which the controller shows them
@@ -119,7 +119,7 @@ class Comparison {
   }
 
  private:
-  /// m and rad: three standard deviations of what rounding does there, and what controllers compute with.
+  /// m and rad: three standard deviations of the rounding there, and the precision that controllers compute with.
   [[nodiscard]] std::pair<double, double> limits_at(const Chain& robot, std::size_t i) const {
     const Eigen::MatrixXd J = robot.jacobian(shown_.q[i]) * rounding_.joints.matrix().asDiagonal();
     const double position = std::sqrt(J.topRows<3>().squaredNorm() + 3 * std::pow(rounding_.position, 2));
@@ -288,7 +288,7 @@ std::vector<std::pair<std::string, Chain>> other_senses(const Chain& robot) {
   return all;
 }
 
-/// What one change of the file explains all, else what changes of all its numbers would.
+/// The single changes of the file that explain all poses; if there are none, the changes of all its numbers.
 std::vector<std::string> explanations(const Chain& robot, const Reading& reading, const Comparison& comparison) {
   std::vector<std::string> found;
   const auto explains = [&](const Chain& arm) {
@@ -358,7 +358,7 @@ std::string off_text(const RobotComparison& result) {
                      to_deg(result.rotation_max));
 }
 
-/// The arm fits what is shown, as `reading` takes it.
+/// The answer where the arm fits the shown poses as `reading` takes them.
 RobotComparison fitting(const Cell& cell, const ShownPoses& shown, const Reading& reading) {
   RobotComparison result = described(reading, shown.q.size());
   const std::string still = still_joints(cell.robot, shown);
