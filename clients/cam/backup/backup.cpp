@@ -55,7 +55,7 @@ class Backup {
 
   Result<ControllerRobot> robot(const std::string& unit, const std::string& next) {
     if (!is_text_) return tl::make_unexpected(is_text_.error());
-    const const ParameterInstance* robot = TRY(choose(unit, next));
+    const ParameterInstance* robot = TRY(choose(unit, next));
     cell_.unit = robot->text("name");
     cell_.robot_type = robot->text("use_robot_type");
     cell_.file = where_;
