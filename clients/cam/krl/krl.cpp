@@ -36,7 +36,6 @@ using krl::State;
 using krl::Token;
 using krl::TokenKind;
 using krl::Told;
-using krl::upper;
 using krl::Value;
 
 constexpr int kDeepest = 20;  // calls within calls
