@@ -160,11 +160,10 @@ Status localise_batch(const ReferencesArguments& arguments, const ReferenceCheck
         .beyond(to_mm(check.rms_remaining), arguments.repeat_above_mm)
         .with_text(check.worst);
   }
-  return read_batch_file(arguments.batch).and_then([&](MeasurementBatch batch) {
-    TRY(require_positions(batch, "references --batch"));
-    const Pose X_WV = check.verdict == ReferenceVerdict::kFine ? Pose::Identity() : check.X_WV;
-    return write_output(arguments.output, to_csv(localised(std::move(batch), X_WV)));
-  });
+  MeasurementBatch batch = TRY(read_batch_file(arguments.batch));
+  TRY(require_positions(batch, "references --batch"));
+  const Pose X_WV = check.verdict == ReferenceVerdict::kFine ? Pose::Identity() : check.X_WV;
+  return write_output(arguments.output, to_csv(localised(std::move(batch), X_WV)));
 }
 
 Status check_reflectors(const ReferencesArguments& arguments) {
