@@ -33,11 +33,11 @@ Result<std::vector<Default>> read_defaults(const std::string& path) {
   long row = 0;
   for (std::string line; std::getline(lines, line);) {
     ++row;
-    line = trimmed(line.substr(0, line.find('#')));
+    line = std::string(trimmed(std::string_view(line).substr(0, line.find('#'))));
     if (line.empty()) continue;
     const auto equals = line.find('=');
-    const std::string name = trimmed(line.substr(0, equals));
-    const std::string value = equals == std::string::npos ? "" : trimmed(line.substr(equals + 1));
+    const std::string name(trimmed(std::string_view(line).substr(0, equals)));
+    const std::string value(equals == std::string::npos ? "" : trimmed(std::string_view(line).substr(equals + 1)));
     if (value.empty())
       return failure(ErrorCode::kUsage, "'{}' is no name = value", shown_short(line))
           .in(path)
