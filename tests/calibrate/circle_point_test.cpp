@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 #include <optional>
 #include <random>
@@ -300,11 +301,110 @@ TEST(CirclePoint, RefusesWithRowValueAndLimit) {
   }
   EXPECT_EQ(refusal(line, nominal), Refusal(good.where, 7, "joint").value(2));
   EXPECT_EQ(refusal(good, shipped("abb_irb1200-5-09.yaml")), Refusal(good.where, {}, "a1").beyond(320, 100));
-  std::vector<Joint> plain;
-  for (int i = 0; i < 6; ++i) plain.push_back(nominal.joint(i));
+  EXPECT_EQ(refusal(good, shipped("abb_irb6640-205-275-on-rail.yaml")), Refusal(good.where, 2).beyond(6, 7));
+}
+
+/// What a test expects of the numbers of `result` that are measured; the names of the others.
+std::string expect_measured(const CirclePointResult& result, const std::map<std::string, double>& deviations) {
+  std::string missing;
+  for (const MeasuredParameter& parameter : result.parameters) {
+    if (!parameter.measured) {
+      missing += parameter.name + " ";
+    } else {
+      EXPECT_NEAR(parameter.deviation, deviations.at(parameter.name), 1e-9) << parameter.name;
+    }
+  }
+  return missing;
+}
+
+bool says(const CirclePointResult& result, const std::string& part) {
+  return std::any_of(result.notes.begin(), result.notes.end(),
+                     [&](const std::string& note) { return note.find(part) != std::string::npos; });
+}
+
+std::vector<Joint> joints_of(const Chain& robot) {
+  std::vector<Joint> joints;
+  for (int i = 0; i < robot.size(); ++i) joints.push_back(robot.joint(i));
+  return joints;
+}
+
+TEST(CirclePoint, ARowWithParallelAxesIsToldAsAHayatiRowWhateverTheFileHas) {
+  const Chain nominal = shipped("abb_irb6640-205-275.yaml");
+  const Chain truth = perturbed(nominal, 1);
+  std::vector<Joint> plain = joints_of(nominal);
   plain[1].hayati = false;
-  EXPECT_EQ(refusal(good, *Chain::make("plain", plain)), Refusal("", {}, "joints 2: hayati"));
-  EXPECT_EQ(refusal(good, shipped("abb_irb6640-205-275-on-rail.yaml")), Refusal("", {}, "joint 1"));
+  const CirclePointResult result =
+      analysed(*Chain::make("plain", plain), measured(truth, wide(nominal), 1), {.sigma = 1e-9});
+  EXPECT_EQ(expect_measured(result, true_deviations(nominal, truth)), "q1 d1 q6 d6 a6 alpha6 ");
+  EXPECT_TRUE(says(result, "hayati: true"));
+}
+
+/// A SCARA as its file has it: no Hayati row, and a third joint that slides along the fourth axis.
+Chain scara() {
+  std::vector<Joint> joints(4);
+  joints[0].link = {0, 0.387, 0.325, 0, 0};
+  joints[1].link = {0, 0, 0.275, kPi, 0};
+  joints[2].type = JointType::kPrismatic;
+  for (Joint& joint : joints) {
+    joint.lower = from_deg(-105);
+    joint.upper = from_deg(105);
+  }
+  return *Chain::make("scara", joints);
+}
+
+/// The same with Hayati rows.
+Chain scara_in_hayati_rows() {
+  std::vector<Joint> joints = joints_of(scara());
+  joints[0].hayati = joints[1].hayati = true;
+  joints[0].link.d = 0;
+  joints[2].link.d = -0.387;
+  return *Chain::make("scara", joints);
+}
+
+TEST(CirclePoint, PassesOverAJointThatSlidesAlongTheNextAxis) {
+  const Chain rows = scara_in_hayati_rows();
+  std::vector<Joint> made = joints_of(perturbed(rows, 4));
+  made[2] = rows.joint(2);
+  // Nothing marks the height at which tilted axes are apart by a.
+  for (const std::size_t j : {0U, 1U}) {
+    made[j].link.alpha = rows.joint(static_cast<int>(j)).link.alpha;
+    made[j].link.beta = 0;
+  }
+  const Chain truth = *Chain::make("scara", made);
+  Campaign campaign = wide(scara());
+  campaign.posture(2) = 0.08;
+  const ArcList all = measured(truth, campaign, 1);
+  ArcList arcs = all;
+  std::erase_if(arcs.points, [](const ArcPoint& point) { return point.joint == 2; });
+  const CirclePointResult result = analysed(scara(), arcs, {.sigma = 1e-9});
+  EXPECT_EQ(expect_measured(result, true_deviations(rows, truth)), "q1 q4 d4 a4 alpha4 ");
+  EXPECT_TRUE(says(result, "joint 3 slides"));
+  EXPECT_EQ(refusal_of(analyse_circle_points(scara(), all, {})), Refusal(all.where, 50, "joint").value(3));
+  arcs.points[30].q(2) = 0.09;
+  EXPECT_EQ(refusal_of(analyse_circle_points(scara(), arcs, {})), Refusal(arcs.where, 32, "q3_mm").beyond(90, 80));
+}
+
+TEST(CirclePoint, TellsTheArmOnARailThatNoArcIsOf) {
+  const Chain nominal = shipped("abb_irb6640-205-275-on-rail.yaml");
+  std::vector<Joint> made = joints_of(perturbed(nominal, 5));
+  made[0] = nominal.joint(0);
+  const Chain truth = *Chain::make("arm on a rail", made);
+  Campaign campaign = wide(nominal);
+  campaign.posture(0) = 1.2;
+  ArcList arcs = measured(truth, campaign, 1);
+  std::erase_if(arcs.points, [](const ArcPoint& point) { return point.joint == 0; });
+  const CirclePointResult result = analysed(nominal, arcs, {.sigma = 1e-9});
+  EXPECT_EQ(expect_measured(result, true_deviations(nominal, truth)), "q2 d2 q7 d7 a7 alpha7 ");
+  EXPECT_TRUE(says(result, "joint 1 slides"));
+}
+
+TEST(CirclePoint, ASlideAcrossTheNextAxisIsRefusedWithWhatElseTellsIt) {
+  std::vector<Joint> joints = joints_of(scara());
+  joints[2].link.a = 0.1;
+  const Chain across = *Chain::make("across", joints);
+  ArcList arcs = measured(across, wide(across), 1);
+  std::erase_if(arcs.points, [](const ArcPoint& point) { return point.joint == 2; });
+  EXPECT_EQ(refusal_of(analyse_circle_points(across, arcs, {})), Refusal("", {}, "joint 3"));
 }
 
 TEST(ArcsCsv, ReadsArcsPosturesAndReflectors) {

@@ -52,6 +52,7 @@ std::string circle_point_text(const CirclePointResult& result) {
   for (const MeasuredParameter& parameter : result.parameters) {
     if (!parameter.measured) text += fmt::format("  {} not measured: {}\n", parameter.name, parameter.note);
   }
+  for (const std::string& note : result.notes) text += fmt::format("  {}\n", note);
   return text;
 }
 
@@ -100,8 +101,11 @@ ordered_json parameter_json(const MeasuredParameter& parameter) {
 ordered_json circle_point_json(const CirclePointResult& result) {
   ordered_json json = {{"robot", result.robot.name()}};
   for (const CircleFit& circle : result.circles) json["circles"].push_back(circle_json(circle));
-  for (const JointAxis& axis : result.axes) json["axes"].push_back(axis_json(axis, json["axes"].size() + 1));
+  for (std::size_t j = 0; j < result.axes.size(); ++j)
+    if (result.axes[j].sigma > 0 || !result.axes[j].direction_W.isZero())
+      json["axes"].push_back(axis_json(result.axes[j], j + 1));
   for (const MeasuredParameter& parameter : result.parameters) json["parameters"].push_back(parameter_json(parameter));
+  json["notes"] = result.notes;
   const Eigen::Quaterniond q(result.X_WB.linear());
   json["base"] = {{"xyz_mm", vector_json(result.X_WB.translation() * to_mm(1))},
                   {"q_wxyz", {q.w(), q.x(), q.y(), q.z()}}};

@@ -16,14 +16,9 @@ namespace {
 constexpr double kSameAngle = 1e-6;  // rad: a joint that is held reads the same to its last digit
 constexpr double kPointLimit = 1e5;  // m: no instrument measures farther
 
-/// Refuses a robot whose joints do not all draw arcs about axes that stand still.
+/// Refuses a joint that follows another, so that its axis moves.
 Status check_robot(const Chain& robot, const ArcList& arcs) {
   for (int j = 0; j < robot.size(); ++j) {
-    if (robot.joint(j).type == JointType::kPrismatic) {
-      return refused("robot {} joint {} slides and draws no arc", robot.name(), j + 1)
-          .of(fmt::format("joint {}", j + 1))
-          .next("measure the arm without it");
-    }
     for (int before = 0; before < j; ++before) {
       if (robot.transmission()(before, j) == 0) continue;
       return refused("robot {}: joint {} follows joint {}, so that its axis moves", robot.name(), before + 1, j + 1)
@@ -36,6 +31,33 @@ Status check_robot(const Chain& robot, const ArcList& arcs) {
         .in(arcs.where)
         .at_row(point.row)
         .beyond(point.q.size(), robot.size());
+  }
+  return {};
+}
+
+/// Refuses an arc of a joint that slides, and one that slides while arcs are drawn: no arc shows where its axis is.
+Status check_slides(const Chain& robot, const ArcList& arcs) {
+  for (const ArcPoint& point : arcs.points) {
+    for (int j = 0; j < robot.size(); ++j) {
+      if (robot.joint(j).type != JointType::kPrismatic) continue;
+      if (point.joint == j) {
+        return refused("joint {} of robot {} slides and draws no arc", j + 1, robot.name())
+            .in(arcs.where)
+            .at_row(point.row)
+            .of("joint")
+            .with_value(j + 1)
+            .next("leave its rows out: the arcs of the turning joints tell their links");
+      }
+      const double place = point.q(j), before = arcs.points.front().q(j);
+      if (std::abs(place - before) < kSameAngle) continue;
+      return refused("joint {} slides, and is at {:.3f} mm here, at {:.3f} mm before", j + 1, to_mm(place),
+                     to_mm(before))
+          .in(arcs.where)
+          .at_row(point.row)
+          .of(joint_column(j, JointType::kPrismatic))
+          .beyond(to_mm(place), to_mm(before))
+          .next("hold it at one place while all arcs are drawn: no arc shows along which line it slides");
+    }
   }
   return {};
 }
@@ -144,6 +166,7 @@ Status check_held(const std::vector<const ArcPoint*>& points, const JointArcs& g
 
 Result<std::vector<JointArcs>> sorted_by_joint(const Chain& robot, const ArcList& arcs, bool sigma_stated) {
   TRY(check_robot(robot, arcs));
+  TRY(check_slides(robot, arcs));
   std::map<std::pair<int, std::string>, std::vector<const ArcPoint*>> by_arc;
   for (const ArcPoint& point : arcs.points) by_arc[{point.joint, point.reflector}].push_back(&point);
   std::vector<JointArcs> joints(static_cast<std::size_t>(robot.size()));
@@ -157,7 +180,8 @@ Result<std::vector<JointArcs>> sorted_by_joint(const Chain& robot, const ArcList
   for (int j = 0; j < robot.size(); ++j) {
     JointArcs& group = joints[static_cast<std::size_t>(j)];
     group.joint = j;
-    if (group.arcs.empty()) return refused("no arc of joint {}", j + 1).in(arcs.where).of("joint").with_value(j + 1);
+    if (group.arcs.empty() && robot.joint(j).type != JointType::kPrismatic)
+      return refused("no arc of joint {}", j + 1).in(arcs.where).of("joint").with_value(j + 1);
   }
   return joints;
 }

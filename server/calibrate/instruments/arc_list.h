@@ -37,8 +37,9 @@ struct JointArcs {
   std::vector<std::vector<const ArcPoint*>> arcs;
 };
 
-/// An entry for each joint. Refuses prismatic joints and joints that follow another, whose axis moves; a joint without
-/// arc; an arc of fewer than 3 points, or 5 where sigma is not stated; held joints that move.
+/// An entry for each joint; one that slides has no arcs. Refuses joints that follow another, whose axis moves; a
+/// turning joint without arc; arcs of a sliding one, and one that is not at the same place throughout; an arc of fewer
+/// than 3 points, or 5 where sigma is not stated; held joints that move.
 [[nodiscard]] Result<std::vector<JointArcs>> sorted_by_joint(const Chain& robot, const ArcList& arcs,
                                                              bool sigma_stated);
 

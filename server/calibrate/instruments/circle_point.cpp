@@ -29,6 +29,7 @@ struct NamedMember {
 std::vector<NamedMember> members_of(const Chain& robot) {
   std::vector<NamedMember> members;
   for (int i = 0; i < robot.size(); ++i) {
+    if (slides(robot, i)) continue;
     members.push_back({i, &LinkGeometry::theta, "q", false});
     if (!robot.joint(i).hayati) members.push_back({i, &LinkGeometry::d, "d", true});
     members.push_back({i, &LinkGeometry::a, "a", true});
@@ -38,9 +39,9 @@ std::vector<NamedMember> members_of(const Chain& robot) {
   return members;
 }
 
-std::string why_not_measured(const NamedMember& member, const Chain& robot) {
-  if (member.joint == robot.size() - 1) return "the last link: nothing marks the flange";
-  if (member.joint != 0) return {};
+std::string why_not_measured(const NamedMember& member, const TurningJoints& turning) {
+  if (member.joint >= turning.last) return "the last link: nothing marks the flange";
+  if (member.joint != turning.first) return {};
   if (member.member == &LinkGeometry::theta) return "nothing marks the base's azimuth: x0 is conventional";
   if (member.member == &LinkGeometry::d) return "nothing marks the base's height: the origin on axis 1 is conventional";
   return {};
@@ -59,35 +60,46 @@ Eigen::VectorXd deviations(const Chain& robot, const std::vector<NamedMember>& m
 
 /// Everything measured at its posture, with the variance of each joint's residuals.
 struct Fits {
+  Chain robot;  ///< with a Hayati row wherever axes are parallel
+  TurningJoints turning;
+  JointVector held;         ///< m, of each joint that slides, where it stood; else 0
+  std::vector<int> joints;  ///< of each axis
   std::vector<AxisFit> axes;
   std::vector<double> variance;  ///< m^2, of one coordinate
   std::vector<double> widening;  ///< of a covariance whose variance was itself estimated
 };
 
+/// One a joint; of a joint that slides none.
 std::vector<AxisLine> lines_of(const Fits& fits) {
-  std::vector<AxisLine> lines;
-  for (const AxisFit& fit : fits.axes) lines.push_back({fit.n, fit.c});
+  std::vector<AxisLine> lines(static_cast<std::size_t>(fits.robot.size()));
+  for (std::size_t k = 0; k < fits.axes.size(); ++k)
+    lines[static_cast<std::size_t>(fits.joints[k])] = {fits.axes[k].n, fits.axes[k].c};
   return lines;
 }
 
+Result<Links> links_by(const Fits& fits, const std::vector<JointArcs>& groups, const std::vector<AxisLine>& measured) {
+  return links_of(fits.robot, at_zero(fits.robot, groups, measured), fits.held);
+}
+
 /// Deviations with axis `i` changed by `step` in one of its four small changes: two turns, two shifts.
-Result<Eigen::VectorXd> changed_deviations(const Chain& robot, const std::vector<JointArcs>& groups, const Fits& fits,
+Result<Eigen::VectorXd> changed_deviations(const std::vector<JointArcs>& groups, const Fits& fits,
                                            const std::vector<NamedMember>& members, std::size_t i, int change,
                                            double step) {
   const AxisFit& fit = fits.axes[i];
   std::vector<AxisLine> lines = lines_of(fits);
+  AxisLine& line = lines[static_cast<std::size_t>(fits.joints[i])];
   const Vector3 move = across(fit.n).col(change % 2) * step;
   if (change < 2) {
-    lines[i].n = (fit.n + move).normalized();
+    line.n = (fit.n + move).normalized();
   } else {
-    lines[i].c += move;
+    line.c += move;
   }
-  const Links links = TRY(links_of(robot, at_zero(robot, groups, lines)));
-  return deviations(robot, members, links.links);
+  const Links links = TRY(links_by(fits, groups, lines));
+  return deviations(fits.robot, members, links.links);
 }
 
 /// Covariance of the deviations: first derivatives by central differences, a step of one standard deviation each way.
-Result<Eigen::MatrixXd> propagated(const Chain& robot, const std::vector<JointArcs>& groups, const Fits& fits,
+Result<Eigen::MatrixXd> propagated(const std::vector<JointArcs>& groups, const Fits& fits,
                                    const std::vector<NamedMember>& members) {
   const auto size = static_cast<Eigen::Index>(members.size());
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(size, size);
@@ -97,8 +109,8 @@ Result<Eigen::MatrixXd> propagated(const Chain& robot, const std::vector<JointAr
     Eigen::MatrixXd J(size, 4);
     for (int k = 0; k < 4; ++k) {
       const double step = std::max(std::sqrt(small(k, k)), kLeastStep);
-      const Result<Eigen::VectorXd> below = changed_deviations(robot, groups, fits, members, i, k, -step);
-      const Result<Eigen::VectorXd> above = changed_deviations(robot, groups, fits, members, i, k, step);
+      const Result<Eigen::VectorXd> below = changed_deviations(groups, fits, members, i, k, -step);
+      const Result<Eigen::VectorXd> above = changed_deviations(groups, fits, members, i, k, step);
       if (!below || !above) return tl::make_unexpected((below ? above : below).error());
       J.col(k) = (*above - *below) / (2 * step);
     }
@@ -176,20 +188,21 @@ Status add_joint(const JointArcs& group, const ArcList& arcs, double stated_sigm
   axis.freedom = fit.freedom;
   axis.angle_rms = angle_rms;
   axis.direction_u = worst_u(variance * fit.normal_inverse.topLeftCorner<2, 2>());
-  result.axes.push_back(axis);
+  result.axes[static_cast<std::size_t>(group.joint)] = axis;
+  fits.joints.push_back(group.joint);
   describe_circles(group, fit, variance, result.circles);
   fits.axes.push_back(std::move(fit));
   return {};
 }
 
 /// One number of the kinematic table; `variance` of its deviation.
-Result<MeasuredParameter> measured_parameter(const NamedMember& member, const Chain& robot, double deviation,
+Result<MeasuredParameter> measured_parameter(const NamedMember& member, const Fits& fits, double deviation,
                                              double variance, const std::string& where) {
   MeasuredParameter parameter;
   parameter.name = fmt::format("{}{}", member.symbol, member.joint + 1);
   parameter.length = member.length;
-  parameter.nominal = robot.joint(member.joint).link.*member.member;
-  parameter.note = why_not_measured(member, robot);
+  parameter.nominal = fits.robot.joint(member.joint).link.*member.member;
+  parameter.note = why_not_measured(member, fits.turning);
   parameter.measured = parameter.note.empty();
   if (!parameter.measured) return parameter;
   parameter.deviation = deviation;
@@ -198,7 +211,7 @@ Result<MeasuredParameter> measured_parameter(const NamedMember& member, const Ch
   if (std::abs(deviation) < limit) return parameter;
   const auto shown = [&](double si) { return member.length ? to_mm(si) : to_deg(si); };
   return refused("{} is {:.3f} {} from that of robot {}, limit {:.0f}", parameter.name, shown(deviation),
-                 member.length ? "mm" : "deg", robot.name(), shown(limit))
+                 member.length ? "mm" : "deg", fits.robot.name(), shown(limit))
       .in(where)
       .of(parameter.name)
       .beyond(shown(deviation), shown(limit))
@@ -206,28 +219,37 @@ Result<MeasuredParameter> measured_parameter(const NamedMember& member, const Ch
 }
 
 /// The kinematic table from the axes, its uncertainty, and the robot that has it.
-Status add_links(const Chain& robot, const ArcList& arcs, const std::vector<JointArcs>& groups, const Fits& fits,
+Status add_links(const ArcList& arcs, const std::vector<JointArcs>& groups, const Fits& fits,
                  CirclePointResult& result) {
-  const std::vector<AxisLine> lines = at_zero(robot, groups, lines_of(fits));
-  for (std::size_t i = 0; i < lines.size(); ++i) {
+  const std::vector<AxisLine> lines = at_zero(fits.robot, groups, lines_of(fits));
+  for (const int joint : fits.joints) {
+    const auto i = static_cast<std::size_t>(joint);
     result.axes[i].direction_W = lines[i].n;
     result.axes[i].point_W = lines[i].c;
   }
-  const Links links = TRY(links_of(robot, lines));
-  const std::vector<NamedMember> members = members_of(robot);
-  const Eigen::VectorXd deviation = deviations(robot, members, links.links);
-  Eigen::MatrixXd covariance = TRY(propagated(robot, groups, fits, members));
+  const Links links = TRY(links_by(fits, groups, lines_of(fits)));
+  const std::vector<NamedMember> members = members_of(fits.robot);
+  const Eigen::VectorXd deviation = deviations(fits.robot, members, links.links);
+  result.covariance = TRY(propagated(groups, fits, members));
   for (std::size_t k = 0; k < members.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
-    MeasuredParameter parameter =
-        TRY(measured_parameter(members[k], robot, deviation(at), (covariance)(at, at), arcs.where));
-    result.parameters.push_back(std::move(parameter));
+    result.parameters.push_back(
+        TRY(measured_parameter(members[k], fits, deviation(at), result.covariance(at, at), arcs.where)));
   }
-  result.covariance = std::move(covariance);
   result.X_WB = links.X_WB;
-  Chain measured = TRY(with_links(robot, links.links));
-  result.robot = std::move(measured);
+  result.robot = TRY(with_links(fits.robot, links.links));
   return {};
+}
+
+/// Where the joints that slide stood, and what is said of them.
+void add_slides(const Chain& robot, const ArcList& arcs, Fits& fits, CirclePointResult& result) {
+  fits.held = JointVector::Zero(robot.size());
+  for (int j = 0; j < robot.size(); ++j) {
+    if (!slides(robot, j)) continue;
+    if (!arcs.points.empty()) fits.held(j) = arcs.points.front().q(j);
+    result.notes.push_back(
+        fmt::format("joint {} slides and draws no arc: its row stays as the robot file has it", j + 1));
+  }
 }
 
 }  // namespace
@@ -236,11 +258,14 @@ Result<CirclePointResult> analyse_circle_points(const Chain& robot, const ArcLis
                                                 const CirclePointOptions& options) {
   const std::vector<JointArcs> groups = TRY(sorted_by_joint(robot, arcs, options.sigma.has_value()));
   CirclePointResult result;
+  result.axes.resize(groups.size());
   Fits fits;
-  for (const JointArcs& group : groups) {
-    TRY(add_joint(group, arcs, options.sigma.value_or(0), fits, result));
-  }
-  TRY(add_links(robot, arcs, groups, fits, result));
+  fits.turning = TRY(turning_joints(robot));
+  add_slides(robot, arcs, fits, result);
+  fits.robot = TRY(with_hayati_rows(robot, fits.turning, result.notes));
+  for (const JointArcs& group : groups)
+    if (!group.arcs.empty()) TRY(add_joint(group, arcs, options.sigma.value_or(0), fits, result));
+  TRY(add_links(arcs, groups, fits, result));
   return result;
 }
 

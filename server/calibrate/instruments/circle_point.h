@@ -50,11 +50,12 @@ struct CirclePointOptions {
 
 struct CirclePointResult {
   std::vector<CircleFit> circles;  ///< in the order of joints
-  std::vector<JointAxis> axes;     ///< one a joint
+  std::vector<JointAxis> axes;     ///< one a joint; of a joint that slides without direction
   std::vector<MeasuredParameter> parameters;
-  Eigen::MatrixXd covariance;    ///< of the deviations in the order of `parameters`, SI; zero where not measured
-  Chain robot;                   ///< the nominal robot with what was measured
-  Pose X_WB = Pose::Identity();  ///< base on axis 1: z0 is measured, height and azimuth are conventional
+  Eigen::MatrixXd covariance;      ///< of the deviations in the order of `parameters`, SI; zero where not measured
+  std::vector<std::string> notes;  ///< rows that arcs do not show, and rows that are told in another form
+  Chain robot;                     ///< the nominal robot with what was measured
+  Pose X_WB = Pose::Identity();    ///< base on axis 1: z0 is measured, height and azimuth are conventional
 };
 
 /// Fits the arcs and works out the links. Each arc is fitted in space by least squares on the distances from its plane
@@ -62,10 +63,11 @@ struct CirclePointResult {
 /// found; the links follow from row to row: common normal, eq. (3.3), or, in a Hayati row, the point where the next
 /// axis meets the plane across the present one, eq. (3.4). Uncertainties are those of the fits carried through by first
 /// derivatives; where sigma comes from few residuals they are as wide as Student's t makes them. Not measured: d1 and
-/// q1 (nothing marks the base but axis 1) and the last link (nothing marks the flange). Refuses: prismatic joints; a
-/// joint without arc; an arc of fewer than 3 points, or 5 where sigma is not stated; points that lie on a line; held
-/// joints that move; turned angles that differ from commanded ones by more than 1 degree; parallel axes in a row that
-/// is not a Hayati one; links more than 100 mm or 10 degrees from nominal.
+/// q1 (nothing marks the base but axis 1), the last link (nothing marks the flange), and the row of a joint that
+/// slides, which is passed over: along a SCARA's last axis, on a rail before the arm, or behind it. A row with parallel
+/// axes is told as a Hayati row, whatever the robot file has. Refuses: what sorted_by_joint() and turning_joints()
+/// refuse; points that lie on a line; turned angles that differ from commanded ones by more than 1 degree; links more
+/// than 100 mm or 10 degrees from nominal.
 [[nodiscard]] Result<CirclePointResult> analyse_circle_points(const Chain& robot, const ArcList& arcs,
                                                               const CirclePointOptions& options);
 
