@@ -3,13 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/base/text_file.h"
 #include "server/base/units.h"
 #include "server/calibrate/calibrate.h"
 #include "server/calibrate/identify/weighted_pose.h"
 #include "server/error_sources/anchors.h"
+#include "server/robot/cell.h"
 #include "tests/support/demand.h"
 #include "tests/support/figure.h"
 #include "tests/support/gauged_arm.h"
+#include "tests/support/one_point.h"
 #include "tests/support/refusal.h"
 
 namespace trammel {
@@ -316,6 +319,57 @@ TEST(Gauges, WhatDistancesDoNotTellIsRefusedWithWhatToDo) {
   const auto found = calibrate(arm.cell, kM3, two, {});
   ASSERT_FALSE(found);
   EXPECT_NE(found.error().message.find("set-ups of the instrument"), std::string::npos) << found.error().message;
+}
+
+/// A UR5 whose tool nobody knows; its tip touches a point.
+std::shared_ptr<const Cell> cell_of_touches() {
+  const std::string text =
+      "version: 1\ncell: touches\nrobot: robot.yaml\nbase: {xyz_mm: [0, 0, 0]}\ntools: {tip: null}\n"
+      "anchors: {point: {xyz_mm: null, sphere_radius_mm: 0.001}}\ntracker: {sigma_mm: 0.02}\n";
+  return std::make_shared<const Cell>(test::demand(parse_cell(
+      text, test::demand(read_text_file(TRAMMEL_SOURCE_DIR "/models/universal-robots_ur5.yaml")), "cell.yaml")));
+}
+
+Gauge touch(double value) {
+  Gauge gauge;
+  gauge.kind = Gauge::Kind::kTouch;
+  gauge.anchor = "point";
+  gauge.value = value;
+  return gauge;
+}
+
+TEST(Gauges, TouchesOfOnePointNameTheWayInWhichAnUnknownToolIsRead) {
+  const auto touching = cell_of_touches();
+  MeasurementBatch batch = test::one_point(*touching, Vector3::Zero(), Pose::Identity(), 14, 3);
+  for (Measurement& m : batch.measurements) m.gauge = touch(0);
+  const auto refusal = calibrate(touching, {}, batch, {});
+  ASSERT_FALSE(refusal);
+  for (const char* part : {"at one place in all rows", "x_mm, y_mm and z_mm, all 0", "base: null"})
+    EXPECT_NE(refusal.error().next.find(part), std::string::npos) << refusal.error().next;
+
+  // That way leads to the tool.
+  for (Measurement& m : batch.measurements) {
+    m.gauge.reset();
+    m.p_W = Vector3::Zero();
+  }
+  const auto found = calibrate(test::cell_of_one_point("null", "null", "{error_sources: []}"), {}, batch, {});
+  ASSERT_TRUE(found) << found.error().message;
+  PoseContext anywhere;
+  anywhere.q = JointVector::Zero(6);
+  anywhere.tool = "tip";
+  EXPECT_LT((found->model.state(anywhere).X_FT.translation() - Vector3(0.03, 0, 0.15)).norm(), 1e-5);
+  ASSERT_FALSE(found->unidentifiable.empty());
+  EXPECT_EQ(found->unidentifiable.front().parameters, (std::vector<std::string>{"gamma0", "beta0", "alpha0"}));
+}
+
+TEST(Gauges, DistancesWithAnUnknownToolNameTouchesOfOnePointAmongTheWays) {
+  const auto cell = cell_of_touches();
+  MeasurementBatch batch = test::one_point(*cell, Vector3::Zero(), Pose::Identity(), 14, 3);
+  for (Measurement& m : batch.measurements) m.gauge = touch(0.2);
+  const auto refusal = calibrate(cell, {}, batch, {});
+  ASSERT_FALSE(refusal);
+  EXPECT_NE(refusal.error().next.find("measure some positions; or let its point touch one point"), std::string::npos)
+      << refusal.error().next;
 }
 
 }  // namespace

@@ -131,6 +131,35 @@ Vector3 place_of(const Lengths& of, const Spread& spread) {
   return best.p_W;
 }
 
+/// m: a touch of that little from the middle of what is touched is a touch of the point itself.
+constexpr double kAtThePoint = 1e-3;
+
+/// Whether the tool's point stands at one and the same anchor in all rows, wherever that is.
+bool is_about_one_point(const PhysicalModel& model, const MeasurementBatch& batch) {
+  return !batch.measurements.empty() &&
+         std::all_of(batch.measurements.begin(), batch.measurements.end(), [&](const Measurement& m) {
+           if (!m.gauge || m.gauge->kind != Gauge::Kind::kTouch || m.gauge->minus) return false;
+           const Anchor* said = placed_anchor(model, m.gauge->anchor).said;
+           const bool is_point = said->shape == Anchor::Shape::kPoint || said->shape == Anchor::Shape::kSphere;
+           return is_point && m.gauge->anchor == batch.measurements.front().gauge->anchor &&
+                  std::abs(m.gauge->value + said->radius) < kAtThePoint;
+         });
+}
+
+/// What tells an unknown tool in place of gauges.
+std::string way_to_the_tool(const PhysicalModel& model, const MeasurementBatch& batch) {
+  constexpr const char* kHow =
+      "write x_mm, y_mm and z_mm, all 0, in each such row in place of touch_mm or distance_mm and anchor_id (the point "
+      "is then the origin of the batch's frame), and base: null in the cell file: the tool is found from how the "
+      "flange "
+      "turns about the point; how the base is turned about it stays unknown";
+  if (is_about_one_point(model, batch)) return fmt::format("the tool's point is at one place in all rows: {}", kHow);
+  return fmt::format(
+      "write where it sits to some mm, or measure some positions; or let its point touch one point in ten orientations "
+      "or more: {}",
+      kHow);
+}
+
 Status check_told(const std::string& id, const Lengths& of) {
   if (of.lengths.size() < kFewest) {
     return refused("anchor '{}': {} values told of themselves, at least {} are needed to find where it is", id,
@@ -189,7 +218,7 @@ Status check_gauges(const PhysicalModel& model, const MeasurementBatch& batch) {
       .in("batch " + batch.id)
       .of(!cell.X_WB ? "base" : "tools")
       .next(!cell.X_WB ? "write base: {xyz_mm: [0, 0, 0]}, and give anchors' places in the base's frame or as null"
-                       : "write where it sits to some mm, or measure some positions");
+                       : way_to_the_tool(model, batch));
 }
 
 Status locate_anchors(PhysicalModel& model, const MeasurementBatch& batch) {
