@@ -5,12 +5,12 @@
 
 #include "server/base/units.h"
 #include "server/calibrate/frames/frames.h"
+#include "server/compensate/file_doubts.h"
 #include "server/compensate/hidden_error.h"
 #include "server/compensate/paired_gain.h"
 #include "server/compensate/session_changes.h"
 #include "server/error_sources/anchors.h"
 #include "server/measurement/computed_positions.h"
-#include "server/robot/cell_doubts.h"
 #include "server/robot/gauge.h"
 #include "server/robot/robot_confirmation.h"
 
@@ -130,62 +130,6 @@ void add_idle_sources(const CompensatedModel::Parts& parts, std::vector<Note>& n
   }
 }
 
-/// How far a number of a robot may be off its drawing, SI, and how people read it.
-struct Drawing {
-  const char* symbol;
-  double limit;
-  const char* unit;
-  double per_si;
-};
-const Drawing kDrawing[] = {{"q", from_deg(1), "deg", to_deg(1)},
-                            {"d", from_mm(3), "mm", to_mm(1)},
-                            {"a", from_mm(3), "mm", to_mm(1)},
-                            {"alpha", 3e-3, "mrad", 1e3},
-                            {"beta", 3e-3, "mrad", 1e3}};
-
-/// The kind of `d4`; none of `theta7` (of a rail, which stands as it was mounted) or `C2`.
-const Drawing* drawing_of(const std::string& name) {
-  const std::size_t digits = name.find_first_of("0123456789");
-  if (digits == std::string::npos || name.find_first_not_of("0123456789", digits) != std::string::npos) return nullptr;
-  const std::string_view symbol = std::string_view(name).substr(0, digits);
-  for (const Drawing& one : kDrawing)
-    if (symbol == one.symbol) return &one;
-  return nullptr;
-}
-
-/// Of an error source of the arm: its parameters that are farther off than a robot may be by more than their
-/// uncertainty.
-std::string off_drawing(const CompensatedModel::Parts& parts) {
-  std::string off;
-  std::size_t first = 0;
-  for (const ErrorSourcePtr& source : parts.physics.sources) {
-    const std::size_t count = source->parameters().size();
-    for (std::size_t i = first; i < first + count && source->cause().part == causes::Part::kLinks; ++i) {
-      const IdentifiedParameter& one = parts.parameters[i];
-      const Drawing* drawing = drawing_of(one.parameter.name);
-      if (drawing == nullptr || std::abs(one.value) - 2 * one.stddev <= drawing->limit) continue;
-      off += fmt::format("{}{} by {:.3g} {} (limit {:.3g})", off.empty() ? "" : ", ", one.parameter.name,
-                         drawing->per_si * one.value, drawing->unit, drawing->per_si * drawing->limit);
-    }
-    first += count;
-  }
-  return off;
-}
-
-/// A model of the wrong robot file fits positions and is of no use for corrected poses.
-void add_off_drawing(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
-  const std::string off = off_drawing(parts);
-  if (off.empty()) return;
-  notes.push_back(
-      {kOffDrawing, Severity::kStop,
-       fmt::format(
-           "no robot is so far off its drawing: {}; is it this robot's file, and is the tool in the cell file the one "
-           "that was measured (null in its place finds it)? Where the file is not the controller's, corrected poses "
-           "land off by the difference, since the controller solves them with its own arm: compare them (trammel "
-           "confirm-robot)",
-           off)});
-}
-
 void add_confirmation(const Cell& cell, std::vector<Note>& notes) {
   if (confirmation_of(cell)) return;
   notes.push_back({kNotConfirmed, Severity::kInfo,
@@ -296,10 +240,6 @@ void add_untold_turn(const CompensatedModel::Parts& parts, std::vector<Note>& no
       notes.push_back({"base_turn_untold", Severity::kStop, one.sentence});
 }
 
-void add_cell_doubts(const Cell& cell, std::vector<Note>& notes) {
-  for (const CellDoubt& doubt : doubts_of(cell)) notes.push_back({doubt.code, Severity::kWarning, doubt.text});
-}
-
 void add_moved_tools(const CompensatedModel& model, std::vector<Note>& notes) {
   const CompensatedModel::Parts& parts = model.parts();
   if (!parts.bias_origin) return;
@@ -389,8 +329,8 @@ std::vector<Note> notes_of(const CompensatedModel& model) {
   add_suspects(model.parts(), notes);
   add_untold_turn(model.parts(), notes);
   add_sides(model.parts(), notes);
-  add_off_drawing(model.parts(), notes);
-  add_cell_doubts(model.cell(), notes);
+  for (Note& doubt : doubts_of_files(model.parts().physics, model.parts().parameters))
+    notes.push_back(std::move(doubt));
   add_moved_tools(model, notes);
   add_confirmation(model.cell(), notes);
   return gravest_first(std::move(notes));

@@ -16,6 +16,7 @@
 #include "server/diagnose/search/search.h"
 #include "server/diagnose/tell/answers.h"
 #include "server/diagnose/tell/between_sessions.h"
+#include "server/diagnose/tell/file_doubts_told.h"
 #include "server/diagnose/tell/more_than_noise.h"
 #include "server/diagnose/tell/row_mistakes.h"
 #include "server/diagnose/tell/wording.h"
@@ -255,6 +256,7 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
   tell_errors(explained, prepared, diagnosis);
   tell_held_out(explained, prepared, diagnosis);
   tell_findings(explained, prepared, diagnosis.batch, remainder_of(explained, prepared, diagnosis), diagnosis);
+  doubt_beside_parallel_axes(cell->robot, diagnosis);
   tell_since(batch.rows(), diagnosis);
   tell_noise(explained, prepared, diagnosis);
   tell_verdict(diagnosis);
@@ -276,11 +278,13 @@ Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const Check
                      tell_left_over(explained, options.seed, diagnosis);
                      tell_limits(explained, prepared, as_recorded(prepared.surrogates, found.all), diagnosis);
                      tell_budget(cell, prepared.train, diagnosis);
+                     tell_file_doubts(cell, prepared.train, diagnosis);
                    }});
   TRY(run(steps, options));
   tell_sessions(together, diagnosis);
   doubt_changes(batch.rows(), diagnosis);
-  diagnosis.sentence = sentence_for(diagnosis) + told_of_sessions(diagnosis) + told_of_jump(cell, batch, diagnosis);
+  diagnosis.sentence = file_doubts_said(diagnosis) + sentence_for(diagnosis) + told_of_sessions(diagnosis) +
+                       told_of_jump(cell, batch, diagnosis);
   return diagnosis;
 }
 

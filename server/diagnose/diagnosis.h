@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "server/base/note.h"
 #include "server/compensate/budget/budget.h"
 #include "server/compensate/compensated_model.h"
 #include "server/compensate/session_changes.h"
@@ -181,6 +182,7 @@ struct Diagnosis {
   NextPoses next_poses;
   std::vector<Dependence> leftover;
   std::vector<std::string> limits;  ///< what the batch does not record, and what that rules out
+  std::vector<Note> notes;          ///< what is doubtful of robot file and cell file: `sentence` begins with it
   /// Where the error of the drawing comes from, by the cell's error sources and the geometry.
   std::optional<ErrorBudget> budget;
 

@@ -193,6 +193,7 @@ ordered_json diagnosis_json(const Diagnosis& diagnosis, const std::vector<Note>&
           {"next_poses_for", next_poses_worth_json(diagnosis)},
           {"leftover", leftover_json(diagnosis.leftover)},
           {"limits", diagnosis.limits},
+          {"notes", notes_json(diagnosis.notes)},
           {"budget", diagnosis.budget ? budget_json(*diagnosis.budget) : ordered_json(nullptr)},
           {"notes", notes_json(notes)},
           {"waterfall", waterfall_json(diagnosis.waterfall)},

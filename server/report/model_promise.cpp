@@ -5,6 +5,7 @@
 
 #include "server/base/units.h"
 #include "server/base/unix_time.h"
+#include "server/compensate/file_doubts.h"
 #include "server/compensate/model_notes.h"
 #include "server/health/health_check.h"
 #include "server/measurement/pose_columns.h"

@@ -62,19 +62,28 @@ void doubt_lengths(const Cell& cell, std::vector<CellDoubt>& doubts) {
 }
 
 void doubt_parallel(const Chain& robot, std::vector<CellDoubt>& doubts) {
-  for (int j = 0; j + 1 < robot.size(); ++j) {
-    const Joint &one = robot.joint(j), &next = robot.joint(j + 1);
-    const bool turn = one.type == JointType::kRevolute && next.type == JointType::kRevolute;
-    if (one.hayati || !turn || std::abs(std::sin(one.link.alpha)) > kParallel) continue;
+  for (const int j : rows_without_hayati(robot)) {
     doubts.push_back(
         {"hayati_missing",
          fmt::format("the axes of joints {} and {} are parallel, and joint {} of the robot file has no `hayati: true`: "
-                     "no measurement tells d of one from d of the other",
+                     "no number of the model is the tilt of the one axis against the other, so that it is taken for "
+                     "something else, and no measurement tells d of one from d of the other; write `hayati: true` "
+                     "there, its d in the row behind it",
                      j + 1, j + 2, j + 1)});
   }
 }
 
 }  // namespace
+
+std::vector<int> rows_without_hayati(const Chain& robot) {
+  std::vector<int> rows;
+  for (int j = 0; j + 1 < robot.size(); ++j) {
+    const Joint &one = robot.joint(j), &next = robot.joint(j + 1);
+    const bool turn = one.type == JointType::kRevolute && next.type == JointType::kRevolute;
+    if (!one.hayati && turn && std::abs(std::sin(one.link.alpha)) < kParallel) rows.push_back(j);
+  }
+  return rows;
+}
 
 std::vector<CellDoubt> doubts_of(const Cell& cell) {
   std::vector<CellDoubt> doubts;

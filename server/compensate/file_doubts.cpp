@@ -1,0 +1,82 @@
+#include "server/compensate/file_doubts.h"
+
+#include <cmath>
+#include <string>
+#include <string_view>
+
+#include "server/base/units.h"
+#include "server/robot/cell_doubts.h"
+
+namespace trammel {
+
+namespace {
+
+using Severity = Note::Severity;
+
+/// How far a number of a robot may be off its drawing, SI, and how people read it.
+struct Drawing {
+  const char* symbol;
+  double limit;
+  const char* unit;
+  double per_si;
+};
+const Drawing kDrawing[] = {{"q", from_deg(1), "deg", to_deg(1)},
+                            {"d", from_mm(3), "mm", to_mm(1)},
+                            {"a", from_mm(3), "mm", to_mm(1)},
+                            {"alpha", 3e-3, "mrad", 1e3},
+                            {"beta", 3e-3, "mrad", 1e3}};
+
+/// The kind of `d4`; none of `theta7` (of a rail, which stands as it was mounted) or `C2`.
+const Drawing* drawing_of(const std::string& name) {
+  const std::size_t digits = name.find_first_of("0123456789");
+  if (digits == std::string::npos || name.find_first_not_of("0123456789", digits) != std::string::npos) return nullptr;
+  const std::string_view symbol = std::string_view(name).substr(0, digits);
+  for (const Drawing& one : kDrawing)
+    if (symbol == one.symbol) return &one;
+  return nullptr;
+}
+
+/// Of an error source of the arm: its parameters that are farther off than a robot may be by more than their
+/// uncertainty.
+std::string off_drawing(const PhysicalModel& model, const std::vector<IdentifiedParameter>& parameters) {
+  std::string off;
+  std::size_t first = 0;
+  for (const ErrorSourcePtr& source : model.sources) {
+    const std::size_t count = source->parameters().size();
+    for (std::size_t i = first; i < first + count && source->cause().part == causes::Part::kLinks; ++i) {
+      const IdentifiedParameter& one = parameters[i];
+      const Drawing* drawing = drawing_of(one.parameter.name);
+      if (drawing == nullptr || std::abs(one.value) - 2 * one.stddev <= drawing->limit) continue;
+      off += fmt::format("{}{} by {:.3g} {} (limit {:.3g})", off.empty() ? "" : ", ", one.parameter.name,
+                         drawing->per_si * one.value, drawing->unit, drawing->per_si * drawing->limit);
+    }
+    first += count;
+  }
+  return off;
+}
+
+/// A model of the wrong robot file fits positions and is of no use for corrected poses.
+void add_off_drawing(const PhysicalModel& model, const std::vector<IdentifiedParameter>& parameters,
+                     std::vector<Note>& notes) {
+  const std::string off = off_drawing(model, parameters);
+  if (off.empty()) return;
+  notes.push_back(
+      {kOffDrawing, Severity::kStop,
+       fmt::format(
+           "no robot is so far off its drawing: {}; is it this robot's file, and is the tool in the cell file the one "
+           "that was measured (null in its place finds it)? Where the file is not the controller's, corrected poses "
+           "land off by the difference, since the controller solves them with its own arm: compare them (trammel "
+           "confirm-robot)",
+           off)});
+}
+
+}  // namespace
+
+std::vector<Note> doubts_of_files(const PhysicalModel& model, const std::vector<IdentifiedParameter>& parameters) {
+  std::vector<Note> notes;
+  add_off_drawing(model, parameters, notes);
+  for (const CellDoubt& doubt : doubts_of(*model.cell)) notes.push_back({doubt.code, Severity::kWarning, doubt.text});
+  return notes;
+}
+
+}  // namespace trammel

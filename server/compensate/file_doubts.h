@@ -1,0 +1,22 @@
+#pragma once
+
+#include <vector>
+
+#include "server/base/note.h"
+#include "server/calibrate/calibration.h"
+
+namespace trammel {
+
+/// Of a robot file that cannot be this robot's: no corrected pose can be promised.
+constexpr const char* kOffDrawing = "robot_off_drawing";
+
+/// What is doubtful of the robot file and of the cell file, the gravest first. Whoever looks at a calibration asks
+/// here: a training, and a diagnosis.
+///
+/// `kStop`: a number of the robot file is farther off than a robot is off its drawing (3 mm, 3 mrad, 1 degree of a
+/// zero) by what was identified, `parameters` of `model`. `kWarning`: what is doubtful before any measurement
+/// (server/robot/cell_doubts.h).
+[[nodiscard]] std::vector<Note> doubts_of_files(const PhysicalModel& model,
+                                                const std::vector<IdentifiedParameter>& parameters);
+
+}  // namespace trammel

@@ -1,0 +1,81 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "server/base/text_file.h"
+#include "server/base/units.h"
+#include "server/compensate/file_doubts.h"
+#include "server/compensate/model_notes.h"
+#include "server/diagnose/diagnose.h"
+#include "server/trainer/pipeline/train.h"
+#include "tests/support/demand.h"
+#include "tests/support/virtual_robot.h"
+
+// A robot file that is not this robot's is told before whatever else is found.
+
+namespace trammel {
+namespace {
+
+/// cell-7 with `was` of the robot file written as `is`.
+std::shared_ptr<const Cell> cell_with(const std::string& was, const std::string& is) {
+  const auto cell = test::cell_7();
+  std::string robot = cell->robot_yaml;
+  const std::size_t at = robot.find(was);
+  EXPECT_NE(at, std::string::npos) << robot;
+  robot.replace(at, was.size(), is);
+  return std::make_shared<const Cell>(test::demand(parse_cell(cell->cell_yaml, robot, "cell.yaml")));
+}
+
+VirtualRobot with_value(VirtualRobot robot, const std::string& name, double by) {
+  const std::vector<Parameter> parameters = robot.truth.parameters();
+  for (std::size_t k = 0; k < parameters.size(); ++k)
+    if (parameters[k].name == name) robot.truth.values(static_cast<Eigen::Index>(k)) += by;
+  return robot;
+}
+
+Diagnosis diagnosed(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch) {
+  DiagnoseOptions options;
+  options.draws = 200;
+  options.recovery = false;
+  options.next_poses = 0;
+  return test::demand(diagnose(cell, batch, options));
+}
+
+TEST(FileDoubts, ALinkThatIsWrongInTheFileLeadsThoughTheListOfCausesExplainsIt) {
+  const MeasurementBatch batch = test::measured(test::chapter_5_robot(test::cell_7()), 80, 5);
+  for (const auto& [file, off] : {std::pair("a_mm: 1292", "a2 by -1"), std::pair("a_mm: 1275", "a2 by ")}) {
+    const auto cell = cell_with("a_mm: 1280", file);
+    const Diagnosis found = diagnosed(cell, batch);
+    EXPECT_TRUE(found.sentence.starts_with("No robot is so far off its drawing: ")) << found.sentence;
+    EXPECT_NE(found.sentence.find(off), std::string::npos) << found.sentence;
+    ASSERT_FALSE(found.notes.empty());
+    EXPECT_EQ(found.notes.front().code, kOffDrawing);
+    TrainOptions options;
+    options.bias = "none";
+    const auto stop = stop_of(test::demand(train(cell, batch, options)));
+    ASSERT_TRUE(stop);
+    EXPECT_EQ(stop->text, found.notes.front().text) << "a training and a diagnosis say it alike";
+  }
+  const Diagnosis right = diagnosed(test::cell_7(), batch);
+  EXPECT_TRUE(right.notes.empty());
+  EXPECT_EQ(right.sentence.find("drawing"), std::string::npos) << right.sentence;
+}
+
+TEST(FileDoubts, AForgottenHayatiRowIsToldAndNoCauseOfItsJointsIsSure) {
+  const auto cell = cell_with(", hayati: true", "");
+  for (const double tilt : {4e-4, 1.5e-3}) {
+    const VirtualRobot robot = with_value(test::chapter_5_robot(test::cell_7()), "beta2", tilt);
+    const Diagnosis found = diagnosed(cell, test::measured(robot, 80, 5));
+    EXPECT_NE(found.sentence.find("joint 2 of the robot file has no `hayati: true`"), std::string::npos)
+        << found.sentence;
+    ASSERT_FALSE(found.notes.empty());
+    EXPECT_EQ(found.notes.back().code, "hayati_missing");
+    for (const Finding& finding : found.findings) {
+      if (finding.cause.joint != 1 && finding.cause.joint != 2) continue;
+      EXPECT_FALSE(finding.could_also_be.empty()) << found.sentence;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace trammel
