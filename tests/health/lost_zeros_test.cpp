@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <random>
 
 #include "server/base/units.h"
 #include "server/health/health_check.h"
@@ -82,6 +83,64 @@ TEST(LostZerosOfSixPoses, AreNamedThoughTheFileWouldFitBetterReadOtherwise) {
   ASSERT_TRUE(check) << check.error().message;
   ASSERT_FALSE(check->changed.empty()) << check->sentence;
   EXPECT_EQ(check->changed.front().zeros.size(), 3u) << check->sentence;
+}
+
+/// One model for all tests of the arm with six axes.
+const CompensatedModel& model_of_six_axes() {
+  static const CompensatedModel model = test::trained(test::irb120());
+  return model;
+}
+
+/// All over the workspace.
+std::vector<JointVector> spread_poses(int count, std::uint64_t seed) {
+  constexpr double kWidest[] = {2.2, 1.1, 1.0, 2.2, 1.6, 2.5};  // rad
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> share(-1, 1);
+  std::vector<JointVector> poses;
+  for (int i = 0; i < count; ++i) {
+    JointVector q(6);
+    for (int j = 0; j < 6; ++j) q(j) = kWidest[j] * share(random);
+    poses.push_back(q);
+  }
+  return poses;
+}
+
+TEST(LostZeroOfTheLastJoint, StandsBesideEveryToolThatSitsElsewhere) {
+  for (const bool orientation : {false, true}) {
+    for (const double zero : {0.0, 2e-4, 3e-3}) {
+      PlainCheck knocked{spread_poses(14, 3), JointVector::Zero(6), orientation};
+      knocked.tool += Vector3(0.8e-3, -0.4e-3, 0.5e-3);
+      knocked.zeros(5) = zero;
+      const HealthCheck check = test::demand(checked(model_of_six_axes(), measured(test::irb120(), knocked)));
+      ASSERT_FALSE(check.changed.empty()) << check.sentence;
+      if (zero > 0 || !orientation) {
+        EXPECT_TRUE(names_zero_of(check, 6)) << zero << orientation << ": " << check.sentence;
+      }
+      const bool is_told = std::any_of(check.changed.begin(), check.changed.end(), [](const SeenChange& change) {
+        return change.cause.record->spelling == "tool_changed";
+      });
+      EXPECT_TRUE(is_told) << zero << orientation << ": " << check.sentence;
+      if (!orientation) {
+        EXPECT_NE(check.sentence.find("look at the mark of joint 6"), std::string::npos) << check.sentence;
+      }
+    }
+  }
+}
+
+TEST(LostZerosOfSeveralJoints, AreNamedBesideAPoseThatWasMeasuredWrongly) {
+  for (const bool orientation : {false, true}) {
+    PlainCheck several{spread_poses(14, 5), JointVector::Zero(6), orientation};
+    several.zeros << 0, 2e-3, -1.5e-3, 0, 2.5e-3, 0;
+    MeasurementBatch batch = measured(test::irb120(), several);
+    Measurement& bad = batch.measurements[4];
+    bad.p_W += Vector3(2e-3, -3e-3, 2.5e-3);
+    const HealthCheck check = test::demand(checked(model_of_six_axes(), batch));
+    EXPECT_EQ(check.suspects, std::vector<std::string>{bad.pose_id}) << check.sentence;
+    ASSERT_FALSE(check.changed.empty()) << check.sentence;
+    ASSERT_EQ(check.changed.front().zeros.size(), 3u) << check.sentence;
+    for (const LostZero& zero : check.changed.front().zeros)
+      EXPECT_NEAR(zero.by, several.zeros(zero.joint), 1.5 * zero.u95) << check.sentence;
+  }
 }
 
 }  // namespace

@@ -18,6 +18,15 @@ constexpr int kMostSteps = 12;
 constexpr double kSettled = 1e-3;      // whitened square of a step
 constexpr double kFarthestTurn = 0.3;  // rad, of a step: beyond it nothing is linear
 
+/// Leaves of both what is across `free`, which may be anything.
+void take_out(const MatrixXd& free, MatrixXd& J, VectorXd& residual) {
+  if (free.cols() == 0) return;
+  const Eigen::HouseholderQR<MatrixXd> qr(free);
+  const MatrixXd Q = qr.householderQ() * MatrixXd::Identity(free.rows(), free.cols());
+  J -= Q * (Q.transpose() * J);
+  residual -= Q * (Q.transpose() * residual);
+}
+
 }  // namespace
 
 ZerosSearch::ZerosSearch(const CauseEffects& effects, const CheckRows& rows, std::vector<std::size_t> zeros,
@@ -50,9 +59,10 @@ ZerosSearch::Linear ZerosSearch::linear(const VectorXd& at, const Pose& X_BB, bo
   return now;
 }
 
-ZerosFit ZerosSearch::begun(unsigned chosen, bool tool) const {
+ZerosFit ZerosSearch::begun(unsigned chosen, bool tool, const std::vector<int>& bad) const {
   ZerosFit one;
   one.tool = tool;
+  one.bad = bad;
   for (std::size_t k = 0; k < zeros_.size(); ++k) {
     if ((chosen >> k & 1U) == 0) continue;
     one.zeros.push_back(zeros_[k]);
@@ -65,9 +75,23 @@ ZerosFit ZerosSearch::begun(unsigned chosen, bool tool) const {
   return one;
 }
 
+MatrixXd ZerosSearch::freeing(const std::vector<int>& bad) const {
+  Index numbers = 0;
+  for (const int pose : bad) numbers += rows_.count[static_cast<std::size_t>(pose)];
+  MatrixXd free = MatrixXd::Zero(rows_.residual.size(), numbers);
+  Index column = 0;
+  for (const int pose : bad) {
+    const auto i = static_cast<std::size_t>(pose);
+    free.block(rows_.first[i], column, rows_.count[i], rows_.count[i]).setIdentity();
+    column += rows_.count[i];
+  }
+  return factor_.matrixL().solve(free);
+}
+
 void ZerosSearch::fit(ZerosFit& one) const {
   const auto k = static_cast<Index>(one.columns.size());
   const Index b = rows_.by_base.cols();
+  const MatrixXd free = freeing(one.bad);
   VectorXd precision(k);  // of the prior
   precision.setConstant(std::pow(kWidest, -2));
   precision.head(static_cast<Index>(one.zeros.size())).setConstant(std::pow(kWidestZero, -2));
@@ -76,7 +100,8 @@ void ZerosSearch::fit(ZerosFit& one) const {
     MatrixXd J(now.residual.size(), b + k);
     J << now.by_base, now.by_cause(Eigen::all, one.columns);
     J = factor_.matrixL().solve(J);
-    const VectorXd residual = factor_.matrixL().solve(now.residual);
+    VectorXd residual = factor_.matrixL().solve(now.residual);
+    take_out(free, J, residual);
     MatrixXd information = J.transpose() * J;
     information.diagonal().tail(k) += precision;
     VectorXd gradient = J.transpose() * residual;
@@ -98,13 +123,13 @@ void ZerosSearch::fit(ZerosFit& one) const {
   }
 }
 
-std::vector<ZerosFit> ZerosSearch::all() const {
+std::vector<ZerosFit> ZerosSearch::all(const std::vector<int>& bad) const {
   std::vector<ZerosFit> fits;
   if (zeros_.size() > kMostZeros) return fits;
   for (const bool tool : {false, true}) {
     if (tool && (new_tool_ || tool_numbers_ == 0)) continue;
     for (unsigned chosen = tool ? 0 : 1; chosen < 1U << zeros_.size(); ++chosen) {
-      fits.push_back(begun(chosen, tool));
+      fits.push_back(begun(chosen, tool, bad));
       fit(fits.back());
     }
   }

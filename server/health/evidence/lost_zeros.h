@@ -15,6 +15,7 @@ namespace trammel::health {
 struct ZerosFit {
   std::vector<std::size_t> zeros;  ///< indices in CauseEffects::causes(), ascending
   bool tool = false;               ///< sits elsewhere as well
+  std::vector<int> bad = {};       ///< poses that do not count
   int numbers = 0;                 ///< that are free and show at the poses
   double left = 0;                 ///< whitened square of what they do not explain
   Pose X_BB = Pose::Identity();    ///< the base, seen from where the rows have it
@@ -31,8 +32,8 @@ class ZerosSearch {
 
   [[nodiscard]] const std::vector<std::size_t>& causes() const { return zeros_; }
   /// Each set of zeros, without and with the tool, and the tool alone. Empty of arms with so many joints that they are
-  /// too many.
-  [[nodiscard]] std::vector<ZerosFit> all() const;
+  /// too many. `bad`: poses that do not count.
+  [[nodiscard]] std::vector<ZerosFit> all(const std::vector<int>& bad = {}) const;
   /// The check's rows, linear around the fit: what its numbers do there included.
   [[nodiscard]] CheckRows around(const ZerosFit& fit) const;
 
@@ -43,7 +44,9 @@ class ZerosSearch {
   };
   /// `warmth`: with what it does, which no zero needs.
   [[nodiscard]] Linear linear(const Eigen::VectorXd& at, const Pose& X_BB, bool warmth) const;
-  [[nodiscard]] ZerosFit begun(unsigned chosen, bool tool) const;
+  [[nodiscard]] ZerosFit begun(unsigned chosen, bool tool, const std::vector<int>& bad) const;
+  /// R x m: what frees these poses, whitened.
+  [[nodiscard]] Eigen::MatrixXd freeing(const std::vector<int>& bad) const;
   void fit(ZerosFit& one) const;
 
   const CauseEffects& effects_;

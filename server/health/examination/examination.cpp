@@ -32,7 +32,7 @@ HealthCheck Examination::result(const CheckTimes& times) {
   check_.tolerance = options_.tolerance;
   check_.not_asked = effects_.not_asked();
   sifted_ = healthy_.sifted(rows_.residual);
-  const std::optional<ZerosFit> zeros = lost_zeros(healthy_.tests({}));
+  const std::optional<ZerosFit> zeros = lost_zeros();
   for (const int pose : sifted_.bad) check_.suspects.push_back(rows_.pose_ids[static_cast<std::size_t>(pose)]);
   check_.p_value = healthy_.chance_of(sifted_.smallest_p);
   const CheckTests& tests = healthy_.tests(sifted_.bad);

@@ -40,9 +40,15 @@ class Examination {
   [[nodiscard]] Eigen::MatrixXd frames_of(const CheckRows& rows) const;
   /// Causes that are a turning joint's zero, and that base (and tool) do not make up for.
   [[nodiscard]] std::vector<std::size_t> zeros_of(const Chain& robot) const;
+  /// Refitted in any case, at `there`: frames, and bad poses.
+  [[nodiscard]] Eigen::MatrixXd always_at(const CheckRows& there) const;
   /// Zeros that several joints lost, or one by much, where nothing simpler explains all poses as well and they leave
-  /// nothing beyond chance.
-  [[nodiscard]] std::optional<ZerosFit> lost_zeros(const CheckTests& tests);
+  /// nothing beyond chance. Where they do not, a bad pose or two are looked for beside them.
+  [[nodiscard]] std::optional<ZerosFit> lost_zeros();
+  /// The likeliest of `fits_`, which leave these poses out; empty where it is not what the poses show.
+  [[nodiscard]] std::optional<ZerosFit> likeliest_zeros(const std::vector<int>& bad);
+  /// The pose that fits all zeros and the tool together worst, beyond its price.
+  [[nodiscard]] std::optional<int> pose_that_fits_no_zeros(const std::vector<int>& bad) const;
   /// By Schwarz, above no change, which leaves `whole`.
   [[nodiscard]] double score_of(const ZerosFit& fit, double whole) const {
     return whole - fit.left - price(fit.numbers);
@@ -50,10 +56,16 @@ class Examination {
   [[nodiscard]] double price(int numbers) const {
     return std::log(static_cast<double>(rows_.residual.size())) * numbers;
   }
-  /// True where a single cause, or the bad poses that were found, explain as much for their numbers.
-  [[nodiscard]] bool has_simpler(const CheckTests& tests, const Eigen::VectorXd& left, double score);
+  /// True where a single cause explains as much for its numbers, of what `tests` leave.
+  [[nodiscard]] bool has_simpler(const CheckTests& tests, double score) const;
+  /// True where the bad poses that were found explain as much for their numbers.
+  [[nodiscard]] bool are_bad_poses(double score);
   void tell_zeros(const ZerosFit& fit);
   void tell_tool_beside(const ZerosFit& fit, const CheckRows& there);
+  /// Adds to a tool the zeros whose effect it makes up for at any poses: `beside_tool` leaves nothing of them, `before`
+  /// does. `named`: zeros that are not asked.
+  void tell_zeros_in_tool(const CheckRows& there, const RefittedRows& before, const RefittedRows& beside_tool,
+                          const std::vector<std::size_t>& named, SeenChange& change);
   void tell_other_sets(const ZerosFit& fit, SeenChange& change) const;
   /// Adds the causes that explain as much as this one does beside `others`.
   void tell_rivals_beside(const CheckRows& there, const Eigen::MatrixXd& others, std::size_t cause,

@@ -192,6 +192,16 @@ void Examination::tell_change(const Named& named, const CheckTests& tests) {
   if (std::find(zeros_.causes().begin(), zeros_.causes().end(), one.cause) != zeros_.causes().end())
     change.zeros.push_back({entry.cause.joint, scale * zero.numbers(0), 2 * scale * std::sqrt(zero.covariance(0, 0))});
   tell_rivals(named.hypothesis, tests, tests.scores(tests.rows().left(rows_.residual)), change);
+  if (is_tool(named.hypothesis)) {
+    Eigen::MatrixXd with_tool = joined(always_, one.columns);
+    std::vector<std::size_t> causes;
+    for (const Named& other : named_) {
+      const Hypothesis& also = questions_.hypotheses[other.hypothesis];
+      if (other.hypothesis != named.hypothesis) with_tool = joined(with_tool, also.columns);
+      causes.push_back(also.cause);
+    }
+    tell_zeros_in_tool(rows_, tests.rows(), RefittedRows(rows_.covariance, with_tool), causes, change);
+  }
   check_.changed.push_back(std::move(change));
 }
 

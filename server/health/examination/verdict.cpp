@@ -51,6 +51,27 @@ std::string seen_in_words(const HealthCheck& check) {
   return text;
 }
 
+/// What would decide between what was named and what stands beside it.
+std::string what_tells_more(const Doubt& doubt, const HealthCheck& check) {
+  const auto is_open = [&](const SingleCause& rival) {
+    return !is_zero(rival) || std::find(doubt.in_tool.begin(), doubt.in_tool.end(), rival.joint) == doubt.in_tool.end();
+  };
+  const bool is_sure = std::all_of(check.changed.begin(), check.changed.end(), [&](const SeenChange& change) {
+    return std::none_of(change.could_also_be.begin(), change.could_also_be.end(), is_open) &&
+           change.cause.record != unknown_cause().record;
+  });
+  std::string text;
+  if (!is_sure) text += fmt::format("; `trammel plan --check {}` chooses poses that tell more", 2 * check.poses);
+  for (const int joint : doubt.in_tool) {
+    text += fmt::format(
+        "; no poses tell a tool that sits elsewhere from a lost zero of joint {0}, alone or beside it: look at the "
+        "mark "
+        "of joint {0}, or check with another tool",
+        joint + 1);
+  }
+  return text;
+}
+
 /// Far beyond anything expected is never chance, whatever the tails of the model's errors are.
 bool is_far_beyond(const HealthCheck& check) {
   return check.changed.empty() && check.rms > std::max(kFarOff, kNeverExpected * check.expected_rms);
@@ -68,12 +89,7 @@ void tell_verdict(const HealthOptions& options, const Doubt& doubt, HealthCheck&
         to_mm(check.rms));
   } else if (!check.changed.empty()) {
     check.verdict = HealthVerdict::kChanged;
-    check.sentence = "the robot is not as its model has it; " + seen_in_words(check);
-    const bool is_sure = std::all_of(check.changed.begin(), check.changed.end(), [](const SeenChange& change) {
-      return change.could_also_be.empty() && change.cause.record != unknown_cause().record;
-    });
-    if (!is_sure)
-      check.sentence += fmt::format("; `trammel plan --check {}` chooses poses that tell more", 2 * check.poses);
+    check.sentence = "the robot is not as its model has it; " + seen_in_words(check) + what_tells_more(doubt, check);
   } else if (doubt.scatter > 0) {
     check.sentence = fmt::format(
         "the poses are off by {:.1f} times as much as a healthy robot's, and no change explains that better than noise "

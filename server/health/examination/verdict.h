@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "server/health/foreign_poses.h"
 #include "server/health/health_verdict.h"
 
@@ -9,10 +11,11 @@ namespace trammel::health {
 /// m rms, base refitted: no small change, and effects are no longer linear.
 inline constexpr double kFarOff = kNeverOff;
 
-/// Why nothing was named though something is beyond chance.
+/// What keeps a check from naming a change, or from being sure of it.
 struct Doubt {
   bool is_too_far = false;  ///< the poses are off by more than a small change makes
   double scatter = 0;       ///< times a healthy robot's residuals, where nothing explains them better than noise; or 0
+  std::vector<int> in_tool{};  ///< joints (0-based) whose zeros a tool that was named makes up for at any poses
 };
 /// Of a check whose other members are told.
 void tell_verdict(const HealthOptions& options, const Doubt& doubt, HealthCheck& check);

@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kZeroGains = 10;    // beyond its price: a zero that is named beside others is so once in 5000
 constexpr double kMadeUpFor = 0.01;  // of an effect: so little left of it is not told from what makes up for it
+constexpr std::size_t kMostBadBeside = 2, kPosesToOneBad = 6;  // bad poses that are looked for beside zeros
 
 }  // namespace
 
@@ -34,38 +35,92 @@ void Examination::tell_several_zeros(double left, int numbers, SeenChange& chang
   }
 }
 
-std::optional<ZerosFit> Examination::lost_zeros(const CheckTests& tests) {
-  constexpr int kFewestLeft = 3;  // numbers that can speak against it
-  const Eigen::VectorXd left = tests.rows().left(rows_.residual);
-  const double limit = healthy_.limit(options_.false_alarm);
-  const double smallest = tests.smallest_p(left);
+Eigen::MatrixXd Examination::always_at(const CheckRows& there) const {
+  Eigen::MatrixXd always = frames_of(there);
+  for (const int pose : sifted_.bad)
+    always = joined(always, questions_.hypotheses[questions_.causes + static_cast<std::size_t>(pose)].columns);
+  return always;
+}
+
+std::optional<ZerosFit> Examination::lost_zeros() {
+  const CheckTests& tests = healthy_.tests({});
   off_ = distance_of(tests.rows());
-  if (smallest >= limit) return std::nullopt;
+  if (tests.smallest_p(tests.rows().left(rows_.residual)) >= healthy_.limit(options_.false_alarm)) return std::nullopt;
   fits_ = zeros_.all();
   if (fits_.empty()) return std::nullopt;
+  if (auto found = likeliest_zeros({})) return found;
+  const std::vector<ZerosFit> of_all_poses = fits_;
+  std::vector<int> bad;
+  while (bad.size() < kMostBadBeside && kPosesToOneBad * (bad.size() + 1) <= rows_.poses()) {
+    const std::optional<int> pose = pose_that_fits_no_zeros(bad);
+    if (!pose) break;
+    bad.push_back(*pose);
+    fits_ = zeros_.all(bad);
+    if (auto found = likeliest_zeros(bad)) return found;
+  }
+  fits_ = of_all_poses;
+  return std::nullopt;
+}
+
+std::optional<ZerosFit> Examination::likeliest_zeros(const std::vector<int>& bad) {
+  constexpr int kFewestLeft = 3;  // numbers that can speak against it
+  const double limit = healthy_.limit(options_.false_alarm);
   const auto cost = [&](const ZerosFit& fit) {
     return fit.left + price(fit.numbers) + kZeroGains * (static_cast<double>(fit.zeros.size()) + (fit.tool ? 1 : 0));
   };
   const ZerosFit& best = *std::min_element(fits_.begin(), fits_.end(),
                                            [&](const ZerosFit& a, const ZerosFit& b) { return cost(a) < cost(b); });
-  const bool is_one_linear = best.zeros.size() == 1 && !best.tool && off_ < kFarOff;
+  const CheckTests& tests = healthy_.tests(bad);
+  const CheckTests& of_all = healthy_.tests({});
+  const double off = distance_of(tests.rows());
+  const bool is_one_linear = best.zeros.size() == 1 && !best.tool && off < kFarOff;
   const int freedom = tests.rows().freedom() - best.numbers;
   if (best.zeros.empty() || is_one_linear || freedom < kFewestLeft || chi_square_tail(best.left, freedom) < limit)
     return std::nullopt;
-  if (has_simpler(tests, left, score_of(best, left.squaredNorm()))) return std::nullopt;
-  sifted_ = {{}, smallest};
+  const Eigen::VectorXd left = tests.rows().left(rows_.residual), all_left = of_all.rows().left(rows_.residual);
+  const double of_bad = price(of_all.rows().freedom() - tests.rows().freedom());
+  const double score = score_of(best, all_left.squaredNorm()) - of_bad;
+  if (has_simpler(of_all, score) || are_bad_poses(score)) return std::nullopt;
+  if (!bad.empty() && has_simpler(tests, score_of(best, left.squaredNorm()))) return std::nullopt;
+  sifted_ = {bad, of_all.smallest_p(all_left)};
+  off_ = off;
   return best;
 }
 
-bool Examination::has_simpler(const CheckTests& tests, const Eigen::VectorXd& left, double score) {
-  const std::vector<double> scores = tests.scores(left);
+std::optional<int> Examination::pose_that_fits_no_zeros(const std::vector<int>& bad) const {
+  const CheckRows there = zeros_.around(fits_.back());
+  Eigen::MatrixXd refitted = joined(frames_of(there), there.by_cause(Eigen::all, fits_.back().columns));
+  for (const int pose : bad)
+    refitted = joined(refitted, questions_.hypotheses[questions_.causes + static_cast<std::size_t>(pose)].columns);
+  const RefittedRows beside(rows_.covariance, refitted);
+  const Eigen::VectorXd left = beside.left(there.residual);
+  std::optional<int> worst;
+  double most = 0;
+  for (std::size_t h = questions_.causes; h < questions_.hypotheses.size(); ++h) {
+    const Eigen::MatrixXd own = beside.directions(questions_.hypotheses[h].columns);
+    const double score = (own.transpose() * left).squaredNorm() - price(static_cast<int>(own.cols()));
+    if (score <= most) continue;
+    most = score;
+    worst = questions_.hypotheses[h].pose;
+  }
+  return worst;
+}
+
+bool Examination::has_simpler(const CheckTests& tests, double score) const {
+  const std::vector<double> scores = tests.scores(tests.rows().left(rows_.residual));
   for (std::size_t h = 0; h < scores.size(); ++h) {
     const bool is_flexible =
         h < questions_.causes && effects_.causes()[questions_.hypotheses[h].cause].cause.any_function;
     if (scores[h] > score + (is_flexible ? kAlike : 0)) return true;
   }
+  return false;
+}
+
+bool Examination::are_bad_poses(double score) {
+  const CheckTests& tests = healthy_.tests({});
   const RefittedRows& without_bad = healthy_.tests(sifted_.bad).rows();
-  const double by_bad = left.squaredNorm() - without_bad.left(rows_.residual).squaredNorm();
+  const double by_bad =
+      tests.rows().left(rows_.residual).squaredNorm() - without_bad.left(rows_.residual).squaredNorm();
   return by_bad - price(tests.rows().freedom() - without_bad.freedom()) > score;
 }
 
@@ -84,12 +139,12 @@ void Examination::tell_zeros(const ZerosFit& fit) {
   }
   if (count > 1) change.cause.joint = -1;
   set_size(size_of(found, working_.left_square(columns)), found,
-           square_here(there.by_cause(Eigen::all, columns), RefittedRows(rows_.covariance, frames_of(there))), change);
+           square_here(there.by_cause(Eigen::all, columns), RefittedRows(rows_.covariance, always_at(there))), change);
   tell_other_sets(fit, change);
   for (std::size_t k = 0; k < columns.size(); ++k) {
     std::vector<Index> others = fit.columns;
     std::erase(others, columns[k]);
-    tell_rivals_beside(there, joined(frames_of(there), there.by_cause(Eigen::all, others)), fit.zeros[k], change);
+    tell_rivals_beside(there, joined(always_at(there), there.by_cause(Eigen::all, others)), fit.zeros[k], change);
   }
   check_.changed.push_back(std::move(change));
   if (fit.tool) tell_tool_beside(fit, there);
@@ -107,20 +162,28 @@ void Examination::tell_tool_beside(const ZerosFit& fit, const CheckRows& there) 
   SeenChange change;
   change.cause = tool->cause;
   change.p_value = check_.p_value;
-  const RefittedRows beside_base(rows_.covariance, frames_of(there));
+  const RefittedRows beside_base(rows_.covariance, always_at(there));
   set_size(size_of(found, working_.left_square(columns)), found,
            square_here(there.by_cause(Eigen::all, columns), beside_base), change);
-  tell_rivals_beside(there, joined(frames_of(there), there.by_cause(Eigen::all, zeros)),
+  tell_rivals_beside(there, joined(always_at(there), there.by_cause(Eigen::all, zeros)),
                      static_cast<std::size_t>(tool - causes.begin()), change);
-  const RefittedRows beside_all(rows_.covariance, joined(frames_of(there), there.by_cause(Eigen::all, fit.columns)));
-  for (const Hypothesis& one : questions_.hypotheses) {
-    const CauseEffects::Entry& entry = causes[one.cause];
-    const bool is_named = std::find(fit.zeros.begin(), fit.zeros.end(), one.cause) != fit.zeros.end();
-    if (one.pose >= 0 || is_named || !is_zero(entry.cause)) continue;
-    const Eigen::MatrixXd own = there.by_cause.col(entry.columns.front());
-    if (beside_all.left(own).norm() < kMadeUpFor * beside_base.left(own).norm()) add_rival(entry.cause, change);
-  }
+  const RefittedRows beside_all(rows_.covariance, joined(always_at(there), there.by_cause(Eigen::all, fit.columns)));
+  tell_zeros_in_tool(there, beside_base, beside_all, fit.zeros, change);
   check_.changed.push_back(std::move(change));
+}
+
+void Examination::tell_zeros_in_tool(const CheckRows& there, const RefittedRows& before,
+                                     const RefittedRows& beside_tool, const std::vector<std::size_t>& named,
+                                     SeenChange& change) {
+  for (const Hypothesis& one : questions_.hypotheses) {
+    if (one.pose >= 0 || std::find(named.begin(), named.end(), one.cause) != named.end()) continue;
+    const CauseEffects::Entry& entry = effects_.causes()[one.cause];
+    if (!is_zero(entry.cause)) continue;
+    const Eigen::MatrixXd own = there.by_cause.col(entry.columns.front());
+    if (beside_tool.left(own).norm() >= kMadeUpFor * before.left(own).norm()) continue;
+    add_rival(entry.cause, change);
+    doubt_.in_tool.push_back(entry.cause.joint);
+  }
 }
 
 void Examination::tell_other_sets(const ZerosFit& fit, SeenChange& change) const {
