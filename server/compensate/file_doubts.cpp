@@ -1,5 +1,8 @@
 #include "server/compensate/file_doubts.h"
 
+#include <fmt/ranges.h>
+
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <string_view>
@@ -70,7 +73,32 @@ void add_off_drawing(const PhysicalModel& model, const std::vector<IdentifiedPar
            off)});
 }
 
+/// `3, 8, 11 and 4 more`
+std::string rows_of(const std::vector<SuspectPose>& suspects) {
+  constexpr std::size_t kMost = 40;
+  std::vector<int> rows;
+  for (const SuspectPose& pose : suspects) rows.push_back(pose.row);
+  std::sort(rows.begin(), rows.end());
+  const std::size_t shown = std::min(rows.size(), kMost);
+  const std::string text = fmt::format("{}", fmt::join(rows.begin(), rows.begin() + static_cast<long>(shown), ", "));
+  return shown < rows.size() ? fmt::format("{} and {} more", text, rows.size() - shown) : text;
+}
+
 }  // namespace
+
+std::optional<Note> rows_that_do_not_fit(const std::vector<SuspectPose>& suspects, int others) {
+  constexpr double kMany = 0.1;  // of all rows: more than single mistakes
+  const std::size_t count = suspects.size();
+  if (count == 0) return std::nullopt;
+  const bool many = static_cast<double>(count) > kMany * (static_cast<double>(count) + others);
+  double worst = 0;
+  for (const SuspectPose& pose : suspects) worst = std::max(worst, pose.distance);
+  return Note{"rows_do_not_fit", many ? Severity::kStop : Severity::kWarning,
+              fmt::format("{} of the measured rows {} not fit the others, by up to {:.3g} mm, and hardly {}: {} {}; "
+                          "measure {} again",
+                          count, count == 1 ? "does" : "do", to_mm(worst), count == 1 ? "counts" : "count",
+                          count == 1 ? "row" : "rows", rows_of(suspects), count == 1 ? "it" : "them")};
+}
 
 std::vector<Note> doubts_of_files(const PhysicalModel& model, const std::vector<IdentifiedParameter>& parameters) {
   std::vector<Note> notes;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "server/base/note.h"
@@ -9,6 +10,10 @@ namespace trammel {
 
 /// Of a robot file that cannot be this robot's: no corrected pose can be promised.
 constexpr const char* kOffDrawing = "robot_off_drawing";
+
+/// Of rows that were measured beside `others` and do not fit them: which, and by how much. More than a tenth are no
+/// single mistakes, and stop a model. Empty where there are none.
+[[nodiscard]] std::optional<Note> rows_that_do_not_fit(const std::vector<SuspectPose>& suspects, int others);
 
 /// What is doubtful of the robot file and of the cell file, the gravest first. Whoever looks at a calibration asks
 /// here: a training, and a diagnosis.

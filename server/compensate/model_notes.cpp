@@ -206,32 +206,6 @@ void add_computed_positions(const CompensatedModel::Parts& parts, std::vector<No
     notes.push_back({"computed_positions", Severity::kWarning, *std::move(text)});
 }
 
-/// `3, 8, 11 and 4 more`
-std::string rows_of(const std::vector<SuspectPose>& suspects) {
-  constexpr std::size_t kMost = 40;
-  std::vector<int> rows;
-  for (const SuspectPose& pose : suspects) rows.push_back(pose.row);
-  std::sort(rows.begin(), rows.end());
-  const std::size_t shown = std::min(rows.size(), kMost);
-  const std::string text = fmt::format("{}", fmt::join(rows.begin(), rows.begin() + static_cast<long>(shown), ", "));
-  return shown < rows.size() ? fmt::format("{} and {} more", text, rows.size() - shown) : text;
-}
-
-void add_suspects(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
-  constexpr double kMany = 0.1;  // of all rows: more than single mistakes
-  const std::size_t count = parts.suspects.size();
-  if (count == 0) return;
-  const bool many = static_cast<double>(count) > kMany * (static_cast<double>(count) + parts.provenance.training_poses);
-  double worst = 0;
-  for (const SuspectPose& pose : parts.suspects) worst = std::max(worst, pose.distance);
-  notes.push_back(
-      {"rows_do_not_fit", many ? Severity::kStop : Severity::kWarning,
-       fmt::format("{} of the measured rows {} not fit the others, by up to {:.3g} mm, and hardly {}: {} {}; "
-                   "measure {} again",
-                   count, count == 1 ? "does" : "do", to_mm(worst), count == 1 ? "counts" : "count",
-                   count == 1 ? "row" : "rows", rows_of(parts.suspects), count == 1 ? "it" : "them")});
-}
-
 /// A base that the cell does not say, and whose turn the poses do not tell.
 void add_untold_turn(const CompensatedModel::Parts& parts, std::vector<Note>& notes) {
   if (parts.physics.cell->X_WB) return;
@@ -326,7 +300,8 @@ std::vector<Note> notes_of(const CompensatedModel& model) {
   add_left_over(model.parts(), notes);
   add_overstated(model, notes);
   add_computed_positions(model.parts(), notes);
-  add_suspects(model.parts(), notes);
+  if (auto rows = rows_that_do_not_fit(model.parts().suspects, model.parts().provenance.training_poses))
+    notes.push_back(*std::move(rows));
   add_untold_turn(model.parts(), notes);
   add_sides(model.parts(), notes);
   for (Note& doubt : doubts_of_files(model.parts().physics, model.parts().parameters))

@@ -5,6 +5,7 @@
 
 #include "server/base/check.h"
 #include "server/base/hash.h"
+#include "server/calibrate/agreement.h"
 #include "server/calibrate/batch_check.h"
 #include "server/calibrate/calibrate.h"
 #include "server/calibrate/frames/frames.h"
@@ -12,6 +13,7 @@
 #include "server/calibrate/jump.h"
 #include "server/calibrate/one_session.h"
 #include "server/compensate/budget/error_budget.h"
+#include "server/compensate/file_doubts.h"
 #include "server/diagnose/families/candidates.h"
 #include "server/diagnose/search/search.h"
 #include "server/diagnose/tell/answers.h"
@@ -191,6 +193,31 @@ Result<SearchResult> searched(const std::shared_ptr<const Cell>& cell, const Pre
   return result;
 }
 
+/// Where all rows together lead to no arm: takes those out that fit none on which the others agree, as a training does,
+/// and lists them. Whether there are any.
+bool set_aside(const std::shared_ptr<const Cell>& cell, const Placed& placed, const Error& refusal,
+               PreparedBatch& prepared, Diagnosis& diagnosis) {
+  const std::vector<std::string> sources = sources_of(*cell, placed);
+  std::optional<Agreement> agreement =
+      agreement_of(cell, sources, prepared.train, Result<CalibrationResult>(tl::make_unexpected(refusal)));
+  if (!agreement) return false;
+  Result<CalibrationResult> found = calibrate(cell, sources, agreement->agreeing, {});
+  if (!found) return false;
+  add_suspects(agreement->others, *found);
+  const auto& agreeing = agreement->agreeing.measurements;
+  for (const SuspectPose& one : found->suspects) {
+    if (std::any_of(agreeing.begin(), agreeing.end(), [&](const Measurement& m) { return m.row == one.row; })) continue;
+    diagnosis.suspects.push_back({.pose_id = one.pose_id,
+                                  .row = one.row,
+                                  .distance = one.distance,
+                                  .reason = "fits none of the arms on which the other rows agree"});
+  }
+  if (auto rows = rows_that_do_not_fit(found->suspects, static_cast<int>(agreeing.size())))
+    diagnosis.notes.push_back(*std::move(rows));
+  prepared.train = std::move(agreement->agreeing);
+  return true;
+}
+
 /// What changed on the arm between two sessions, and on what that rests.
 void tell_sessions(const Placed& placed, Diagnosis& diagnosis) {
   const CalibrationResult& by = placed.calibration;
@@ -244,10 +271,14 @@ void tell_budget(const std::shared_ptr<const Cell>& cell, const MeasurementBatch
 Result<Diagnosis> diagnosed(const std::shared_ptr<const Cell>& cell, const CheckedBatch& batch,
                             const DiagnoseOptions& options) {
   const Placed together = TRY(placed(cell, batch, options));
-  const PreparedBatch prepared = TRY(prepare(*cell, batch, together.sessions()));
+  PreparedBatch prepared = TRY(prepare(*cell, batch, together.sessions()));
   Diagnosis diagnosis;
-  SearchResult result = TRY(searched(cell, prepared, together, options, diagnosis));
-  const Explained explained(*cell, std::move(result));
+  Result<SearchResult> result = searched(cell, prepared, together, options, diagnosis);
+  if (!result && result.error().code == ErrorCode::kRefused &&
+      set_aside(cell, together, result.error(), prepared, diagnosis))
+    result = searched(cell, prepared, together, options, diagnosis);
+  if (!result) return tl::make_unexpected(result.error());
+  const Explained explained(*cell, std::move(*result));
   const SearchResult& found = explained.found;
   const std::vector<FamilyPtr> families = make_families(explained.after);
 

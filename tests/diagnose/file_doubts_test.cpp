@@ -1,10 +1,11 @@
+#include "server/compensate/file_doubts.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
 #include "server/base/text_file.h"
 #include "server/base/units.h"
-#include "server/compensate/file_doubts.h"
 #include "server/compensate/model_notes.h"
 #include "server/diagnose/diagnose.h"
 #include "server/trainer/pipeline/train.h"
@@ -75,6 +76,33 @@ TEST(FileDoubts, AForgottenHayatiRowIsToldAndNoCauseOfItsJointsIsSure) {
       EXPECT_FALSE(finding.could_also_be.empty()) << found.sentence;
     }
   }
+}
+
+TEST(RowsThatDoNotFit, AreNamedAsATrainingNamesThemWhereAllTogetherLeadToNoArm) {
+  const VirtualRobot robot = test::chapter_5_robot(test::cell_7());
+  MeasurementBatch batch = test::measured(robot, 80, 5);
+  // A tracker that did not see the reflector tells where it was last: 30 rows, some behind each other.
+  std::vector<int> stale;
+  for (std::size_t i = 0; i < batch.measurements.size(); ++i) {
+    const std::size_t since = i % 8;
+    if (since == 0 || since > 3) continue;
+    batch.measurements[i].p_W = batch.measurements[i - since].p_W;
+    batch.measurements[i].R_WT = batch.measurements[i - since].R_WT;
+    stale.push_back(batch.measurements[i].row);
+  }
+  const Diagnosis found = diagnosed(test::cell_7(), batch);
+  std::vector<int> named;
+  for (const SuspectedPose& one : found.suspects) named.push_back(one.row);
+  std::sort(named.begin(), named.end());
+  EXPECT_EQ(named, stale) << found.sentence;
+  ASSERT_FALSE(found.notes.empty()) << found.sentence;
+  EXPECT_EQ(found.notes.front().code, "rows_do_not_fit");
+  EXPECT_TRUE(found.sentence.starts_with("30 of the measured rows do not fit the others")) << found.sentence;
+  TrainOptions options;
+  options.bias = "none";
+  const auto stop = stop_of(test::demand(train(test::cell_7(), batch, options)));
+  ASSERT_TRUE(stop);
+  EXPECT_EQ(stop->text, found.notes.front().text) << "a training and a diagnosis say it alike";
 }
 
 }  // namespace

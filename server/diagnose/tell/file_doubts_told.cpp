@@ -45,7 +45,8 @@ void doubt_beside_parallel_axes(const Chain& robot, Diagnosis& diagnosis) {
 void tell_file_doubts(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch, Diagnosis& diagnosis) {
   const Result<CalibrationResult> found =
       calibrate(cell, diagnosis.sources_after, batch, {.held = {}, .weigh_links = true});
-  if (found) diagnosis.notes = doubts_of_files(found->model, found->parameters);
+  if (!found) return;
+  for (Note& note : doubts_of_files(found->model, found->parameters)) diagnosis.notes.push_back(std::move(note));
 }
 
 std::string file_doubts_said(const Diagnosis& diagnosis) {

@@ -12,7 +12,7 @@ namespace trammel::cause_search {
 /// joints may be that. Its name is in doubt.
 void doubt_beside_parallel_axes(const Chain& robot, Diagnosis& diagnosis);
 
-/// Fills the notes, by what is identified on `batch` with all sources that the diagnosis ends with.
+/// Adds them to the notes, by what is identified on `batch` with all sources that the diagnosis ends with.
 void tell_file_doubts(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch, Diagnosis& diagnosis);
 
 /// The notes, a sentence each, with a blank behind; empty where there are none.
