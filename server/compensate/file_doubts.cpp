@@ -8,7 +8,6 @@
 #include <string_view>
 
 #include "server/base/units.h"
-#include "server/robot/cell_doubts.h"
 
 namespace trammel {
 
@@ -58,21 +57,6 @@ std::string off_drawing(const PhysicalModel& model, const std::vector<Identified
   return off;
 }
 
-/// A model of the wrong robot file fits positions and is of no use for corrected poses.
-void add_off_drawing(const PhysicalModel& model, const std::vector<IdentifiedParameter>& parameters,
-                     std::vector<Note>& notes) {
-  const std::string off = off_drawing(model, parameters);
-  if (off.empty()) return;
-  notes.push_back(
-      {kOffDrawing, Severity::kStop,
-       fmt::format(
-           "no robot is so far off its drawing: {}; is it this robot's file, and is the tool in the cell file the one "
-           "that was measured (null in its place finds it)? Where the file is not the controller's, corrected poses "
-           "land off by the difference, since the controller solves them with its own arm: compare them (trammel "
-           "confirm-robot)",
-           off)});
-}
-
 /// `3, 8, 11 and 4 more`
 std::string rows_of(const std::vector<SuspectPose>& suspects) {
   constexpr std::size_t kMost = 40;
@@ -100,11 +84,18 @@ std::optional<Note> rows_that_do_not_fit(const std::vector<SuspectPose>& suspect
                           count == 1 ? "row" : "rows", rows_of(suspects), count == 1 ? "it" : "them")};
 }
 
-std::vector<Note> doubts_of_files(const PhysicalModel& model, const std::vector<IdentifiedParameter>& parameters) {
-  std::vector<Note> notes;
-  add_off_drawing(model, parameters, notes);
-  for (const CellDoubt& doubt : doubts_of(*model.cell)) notes.push_back({doubt.code, Severity::kWarning, doubt.text});
-  return notes;
+std::optional<Note> robot_off_drawing(const PhysicalModel& model, const std::vector<IdentifiedParameter>& parameters) {
+  const std::string off = off_drawing(model, parameters);
+  if (off.empty()) return std::nullopt;
+  // A model of the wrong robot file fits positions and is of no use for corrected poses.
+  return Note{
+      kOffDrawing, Severity::kStop,
+      fmt::format(
+          "no robot is so far off its drawing: {}; is it this robot's file, and is the tool in the cell file the one "
+          "that was measured (null in its place finds it)? Where the file is not the controller's, corrected poses "
+          "land off by the difference, since the controller solves them with its own arm: compare them (trammel "
+          "confirm-robot)",
+          off)};
 }
 
 }  // namespace trammel

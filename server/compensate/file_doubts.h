@@ -15,13 +15,10 @@ constexpr const char* kOffDrawing = "robot_off_drawing";
 /// single mistakes, and stop a model. Empty where there are none.
 [[nodiscard]] std::optional<Note> rows_that_do_not_fit(const std::vector<SuspectPose>& suspects, int others);
 
-/// What is doubtful of the robot file and of the cell file, the gravest first. Whoever looks at a calibration asks
-/// here: a training, and a diagnosis.
-///
-/// `kStop`: a number of the robot file is farther off than a robot is off its drawing (3 mm, 3 mrad, 1 degree of a
-/// zero) by what was identified, `parameters` of `model`. `kWarning`: what is doubtful before any measurement
-/// (server/robot/cell_doubts.h).
-[[nodiscard]] std::vector<Note> doubts_of_files(const PhysicalModel& model,
-                                                const std::vector<IdentifiedParameter>& parameters);
+/// Of a robot file with a number that is farther off than a robot is off its drawing (3 mm, 3 mrad, 1 degree of a
+/// zero), by what was identified: `parameters` of `model`. It stops a model. Whoever looks at a calibration asks here:
+/// a training, and a diagnosis.
+[[nodiscard]] std::optional<Note> robot_off_drawing(const PhysicalModel& model,
+                                                    const std::vector<IdentifiedParameter>& parameters);
 
 }  // namespace trammel

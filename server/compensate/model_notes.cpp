@@ -11,6 +11,7 @@
 #include "server/compensate/session_changes.h"
 #include "server/error_sources/anchors.h"
 #include "server/measurement/computed_positions.h"
+#include "server/robot/cell_doubts.h"
 #include "server/robot/gauge.h"
 #include "server/robot/robot_confirmation.h"
 
@@ -214,6 +215,10 @@ void add_untold_turn(const CompensatedModel::Parts& parts, std::vector<Note>& no
       notes.push_back({"base_turn_untold", Severity::kStop, one.sentence});
 }
 
+void add_cell_doubts(const Cell& cell, std::vector<Note>& notes) {
+  for (const CellDoubt& doubt : doubts_of(cell)) notes.push_back({doubt.code, Severity::kWarning, doubt.text});
+}
+
 void add_moved_tools(const CompensatedModel& model, std::vector<Note>& notes) {
   const CompensatedModel::Parts& parts = model.parts();
   if (!parts.bias_origin) return;
@@ -304,8 +309,8 @@ std::vector<Note> notes_of(const CompensatedModel& model) {
     notes.push_back(*std::move(rows));
   add_untold_turn(model.parts(), notes);
   add_sides(model.parts(), notes);
-  for (Note& doubt : doubts_of_files(model.parts().physics, model.parts().parameters))
-    notes.push_back(std::move(doubt));
+  if (auto off = robot_off_drawing(model.parts().physics, model.parts().parameters)) notes.push_back(*std::move(off));
+  add_cell_doubts(model.cell(), notes);
   add_moved_tools(model, notes);
   add_confirmation(model.cell(), notes);
   return gravest_first(std::move(notes));

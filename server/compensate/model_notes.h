@@ -20,7 +20,7 @@ constexpr const char* kOneSide = "approached_from_one_side";
 /// `kStop`: a number of the robot file is farther off than a robot is off its drawing (3 mm, 3 mrad, 1 degree of a
 /// zero), so the file is not the controller's, which solves corrected poses with its own arm; or what is left is 30
 /// times the stated sigma. `kWarning`: 3 times the sigma, a bias beside less than half of it, too few poses, poses
-/// approached from one side, doubts of the files (file_doubts.h). `kInfo`: a robot file that was not confirmed,
+/// approached from one side, doubts of the files (cell_doubts.h). `kInfo`: a robot file that was not confirmed,
 /// error sources without effect, a bias that was learned with a tool that has moved since, what changed between
 /// sessions.
 [[nodiscard]] std::vector<Note> notes_of(const CompensatedModel& model);

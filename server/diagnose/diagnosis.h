@@ -182,7 +182,7 @@ struct Diagnosis {
   NextPoses next_poses;
   std::vector<Dependence> leftover;
   std::vector<std::string> limits;  ///< what the batch does not record, and what that rules out
-  /// Rows that were left out since all together lead to no arm, and what is doubtful of robot file and cell file:
+  /// Rows that were left out since all together lead to no arm, and what is doubtful of the robot file:
   /// `sentence` begins with it.
   std::vector<Note> notes;
   /// Where the error of the drawing comes from, by the cell's error sources and the geometry.

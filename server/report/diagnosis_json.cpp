@@ -1,5 +1,7 @@
 #include "server/report/diagnosis_json.h"
 
+#include <algorithm>
+
 #include "server/base/units.h"
 #include "server/diagnose/tell/wording.h"
 #include "server/measurement/pose_columns.h"
@@ -166,6 +168,16 @@ ordered_json waterfall_json(const std::vector<WaterfallStep>& steps) {
   return list;
 }
 
+/// The notes of both, each once.
+std::vector<Note> together(std::vector<Note> notes, const std::vector<Note>& more) {
+  for (const Note& note : more) {
+    const bool is_there =
+        std::any_of(notes.begin(), notes.end(), [&](const Note& known) { return known.text == note.text; });
+    if (!is_there) notes.push_back(note);
+  }
+  return gravest_first(std::move(notes));
+}
+
 }  // namespace
 
 ordered_json diagnosis_json(const Diagnosis& diagnosis, const std::vector<Note>& notes) {
@@ -193,9 +205,8 @@ ordered_json diagnosis_json(const Diagnosis& diagnosis, const std::vector<Note>&
           {"next_poses_for", next_poses_worth_json(diagnosis)},
           {"leftover", leftover_json(diagnosis.leftover)},
           {"limits", diagnosis.limits},
-          {"notes", notes_json(diagnosis.notes)},
           {"budget", diagnosis.budget ? budget_json(*diagnosis.budget) : ordered_json(nullptr)},
-          {"notes", notes_json(notes)},
+          {"notes", notes_json(together(diagnosis.notes, notes))},
           {"waterfall", waterfall_json(diagnosis.waterfall)},
           {"error_sources_before", diagnosis.sources_before},
           {"error_sources_after", diagnosis.sources_after},

@@ -69,7 +69,8 @@ void doubt_parallel(const Chain& robot, std::vector<CellDoubt>& doubts) {
                      "no number of the model is the tilt of the one axis against the other, so that it is taken for "
                      "something else, and no measurement tells d of one from d of the other; write `hayati: true` "
                      "there, its d in the row behind it",
-                     j + 1, j + 2, j + 1)});
+                     j + 1, j + 2, j + 1),
+         true});
   }
 }
 

@@ -9,8 +9,9 @@ namespace trammel {
 
 /// Something in a cell file or robot file that may be read without an error and is hardly meant so.
 struct CellDoubt {
-  std::string code;  ///< `gravity_up`, `quaternion_order`, `lengths_in_metres`, `hayati_missing`
-  std::string text;  ///< one sentence, with the key and the value
+  std::string code;            ///< `gravity_up`, `quaternion_order`, `lengths_in_metres`, `hayati_missing`
+  std::string text;            ///< one sentence, with the key and the value
+  bool of_robot_file = false;  ///< else of the cell file
 };
 
 /// Joints (0-based) whose axis is parallel to the next one, and whose row of the robot file is no Hayati row: the model

@@ -319,7 +319,7 @@ std::string expect_measured(const CirclePointResult& result, const std::map<std:
 
 bool says(const CirclePointResult& result, const std::string& part) {
   return std::any_of(result.notes.begin(), result.notes.end(),
-                     [&](const std::string& note) { return note.find(part) != std::string::npos; });
+                     [&](const Note& note) { return note.text.find(part) != std::string::npos; });
 }
 
 std::vector<Joint> joints_of(const Chain& robot) {

@@ -2,6 +2,7 @@
 
 #include "server/base/units.h"
 #include "server/measurement/files/csv_table.h"
+#include "server/report/note_json.h"
 
 namespace trammel::cli {
 
@@ -52,7 +53,7 @@ std::string circle_point_text(const CirclePointResult& result) {
   for (const MeasuredParameter& parameter : result.parameters) {
     if (!parameter.measured) text += fmt::format("  {} not measured: {}\n", parameter.name, parameter.note);
   }
-  for (const std::string& note : result.notes) text += fmt::format("  {}\n", note);
+  for (const Note& note : result.notes) text += fmt::format("  {}\n", note.text);
   return text;
 }
 
@@ -105,7 +106,7 @@ ordered_json circle_point_json(const CirclePointResult& result) {
     if (result.axes[j].sigma > 0 || !result.axes[j].direction_W.isZero())
       json["axes"].push_back(axis_json(result.axes[j], j + 1));
   for (const MeasuredParameter& parameter : result.parameters) json["parameters"].push_back(parameter_json(parameter));
-  json["notes"] = result.notes;
+  json["notes"] = notes_json(result.notes);
   const Eigen::Quaterniond q(result.X_WB.linear());
   json["base"] = {{"xyz_mm", vector_json(result.X_WB.translation() * to_mm(1))},
                   {"q_wxyz", {q.w(), q.x(), q.y(), q.z()}}};

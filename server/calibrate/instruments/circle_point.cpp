@@ -248,7 +248,8 @@ void add_slides(const Chain& robot, const ArcList& arcs, Fits& fits, CirclePoint
     if (!slides(robot, j)) continue;
     if (!arcs.points.empty()) fits.held(j) = arcs.points.front().q(j);
     result.notes.push_back(
-        fmt::format("joint {} slides and draws no arc: its row stays as the robot file has it", j + 1));
+        {"joint_slides", Note::Severity::kInfo,
+         fmt::format("joint {} slides and draws no arc: its row stays as the robot file has it", j + 1)});
   }
 }
 

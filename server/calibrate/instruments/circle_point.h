@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "server/base/note.h"
 #include "server/calibrate/instruments/arc_list.h"
 
 /// Circle-point analysis, source section 4.1: a reflector on the arm while one joint turns and all others are held
@@ -52,10 +53,10 @@ struct CirclePointResult {
   std::vector<CircleFit> circles;  ///< in the order of joints
   std::vector<JointAxis> axes;     ///< one a joint; of a joint that slides without direction
   std::vector<MeasuredParameter> parameters;
-  Eigen::MatrixXd covariance;      ///< of the deviations in the order of `parameters`, SI; zero where not measured
-  std::vector<std::string> notes;  ///< rows that arcs do not show, and rows that are told in another form
-  Chain robot;                     ///< the nominal robot with what was measured
-  Pose X_WB = Pose::Identity();    ///< base on axis 1: z0 is measured, height and azimuth are conventional
+  Eigen::MatrixXd covariance;    ///< of the deviations in the order of `parameters`, SI; zero where not measured
+  std::vector<Note> notes;       ///< rows that arcs do not show, and rows that are told in another form
+  Chain robot;                   ///< the nominal robot with what was measured
+  Pose X_WB = Pose::Identity();  ///< base on axis 1: z0 is measured, height and azimuth are conventional
 };
 
 /// Fits the arcs and works out the links. Each arc is fitted in space by least squares on the distances from its plane

@@ -86,7 +86,7 @@ Result<TurningJoints> turning_joints(const Chain& robot) {
   return turning;
 }
 
-Result<Chain> with_hayati_rows(const Chain& robot, const TurningJoints& turning, std::vector<std::string>& notes) {
+Result<Chain> with_hayati_rows(const Chain& robot, const TurningJoints& turning, std::vector<Note>& notes) {
   std::vector<Joint> joints;
   double carried = 0;  // m, along the axis
   for (int j = 0; j < robot.size(); ++j) {
@@ -95,10 +95,11 @@ Result<Chain> with_hayati_rows(const Chain& robot, const TurningJoints& turning,
     const bool is_parallel = joint.type == JointType::kRevolute && std::abs(std::sin(joint.link.alpha)) < kAsDrawn;
     const bool becomes = is_parallel && !joint.hayati && j >= turning.first && j < turning.last;
     if (becomes) {
-      notes.push_back(fmt::format(
-          "the axes of joint {} and the next one are parallel, and row {} is no Hayati row: it is told as one "
-          "(`hayati: true`: a, alpha and beta, no d; what it has as d stands in the row behind it)",
-          j + 1, j + 1));
+      notes.push_back(
+          {"hayati_row", Note::Severity::kInfo,
+           fmt::format("the axes of joint {} and the next one are parallel, and row {} is no Hayati row: it is told as "
+                       "one (`hayati: true`: a, alpha and beta, no d; what it has as d stands in the row behind it)",
+                       j + 1, j + 1)});
     }
     if (becomes || (joint.hayati && carried != 0)) {
       carried = cosine * (carried + joint.link.d);

@@ -1,8 +1,8 @@
 #pragma once
 
-#include <string>
 #include <vector>
 
+#include "server/base/note.h"
 #include "server/base/result.h"
 #include "server/calibrate/instruments/arc_list.h"
 #include "server/robot/chain.h"
@@ -28,7 +28,7 @@ struct TurningJoints {
 /// The same robot with a Hayati row wherever an axis is parallel to the next one and both are measured; what such a row
 /// had as d stands in the row behind it. `notes`: which rows those are.
 [[nodiscard]] Result<Chain> with_hayati_rows(const Chain& robot, const TurningJoints& turning,
-                                             std::vector<std::string>& notes);
+                                             std::vector<Note>& notes);
 
 /// Axes as measured at the postures of `groups` -> with the joints before them at zero, in their kinematic sense. A
 /// joint that slides along the next axis has that axis; else the line of a joint that slides is none.

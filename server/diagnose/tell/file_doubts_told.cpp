@@ -45,8 +45,10 @@ void doubt_beside_parallel_axes(const Chain& robot, Diagnosis& diagnosis) {
 void tell_file_doubts(const std::shared_ptr<const Cell>& cell, const MeasurementBatch& batch, Diagnosis& diagnosis) {
   const Result<CalibrationResult> found =
       calibrate(cell, diagnosis.sources_after, batch, {.held = {}, .weigh_links = true});
-  if (!found) return;
-  for (Note& note : doubts_of_files(found->model, found->parameters)) diagnosis.notes.push_back(std::move(note));
+  auto off = found ? robot_off_drawing(found->model, found->parameters) : std::nullopt;
+  if (off) diagnosis.notes.push_back(*std::move(off));
+  for (const CellDoubt& doubt : doubts_of(*cell))
+    if (doubt.of_robot_file) diagnosis.notes.push_back({doubt.code, Note::Severity::kWarning, doubt.text});
 }
 
 std::string file_doubts_said(const Diagnosis& diagnosis) {
