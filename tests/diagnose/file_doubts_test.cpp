@@ -8,7 +8,7 @@
 #include "server/base/units.h"
 #include "server/compensate/model_notes.h"
 #include "server/diagnose/diagnose.h"
-#include "server/trainer/pipeline/train.h"
+#include "server/tasks/train/train.h"
 #include "tests/support/demand.h"
 #include "tests/support/virtual_robot.h"
 
