@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "server/base/median.h"
 #include "server/base/units.h"
 #include "server/robot/arm_state.h"
 #include "server/robot/cube_turns.h"

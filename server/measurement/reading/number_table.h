@@ -30,7 +30,5 @@ struct NumberTable {
 /// whatever order the tools take turns.
 [[nodiscard]] NumberTable thinned(const NumberTable& table, std::size_t most);
 
-/// The middle one; of an even number the upper of the two. `values` is not empty.
-[[nodiscard]] double median(std::vector<double> values);
 
 }  // namespace trammel::reading
