@@ -30,5 +30,4 @@ struct NumberTable {
 /// whatever order the tools take turns.
 [[nodiscard]] NumberTable thinned(const NumberTable& table, std::size_t most);
 
-
 }  // namespace trammel::reading
