@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "server/base/median.h"
 #include "server/base/units.h"
 #include "server/measurement/one_place.h"
 #include "server/measurement/pose_columns.h"
@@ -75,7 +76,7 @@ std::optional<double> turned(const NumberTable& table, const Cell& cell, const A
     for (const Matrix3& R_FT : all) off.push_back(about.angularDistance(Eigen::Quaterniond(R_FT)));
   }
   if (off.empty()) return std::nullopt;
-  return reading::median(off);
+  return median(off);
 }
 
 class Look {
@@ -217,7 +218,7 @@ Error Look::of_reading() const {
 /// Rows that are in another unit than the others.
 std::optional<Error> Look::of_units() const {
   const std::vector<double> off = distances(table_, cell_, *given_);
-  const double limit = std::max(kBadRow, kBadRowRatio * reading::median(off));
+  const double limit = std::max(kBadRow, kBadRowRatio * median(off));
   for (const UnitOfLength& unit : kUnitsOfLength) {
     NumberTable table = table_;
     table.p_W *= unit.factor;
@@ -248,7 +249,7 @@ std::optional<Error> Look::of_units() const {
 /// A block of rows whose joints stand in other rows, while the others follow theirs.
 std::optional<Error> Look::of_some_rows() {
   const std::vector<double> off = distances(table_, cell_, *given_);
-  const double limit = std::max(kBadRow, kBadRowRatio * reading::median(off));
+  const double limit = std::max(kBadRow, kBadRowRatio * median(off));
   const auto bad = static_cast<std::size_t>(std::count_if(off.begin(), off.end(), [&](double d) { return d > limit; }));
   if (bad < kFewestBadRows) return std::nullopt;
   for (const Reading& one : row_readings(table_, cell_)) {
@@ -261,7 +262,7 @@ std::optional<Error> Look::of_some_rows() {
     const auto first = std::find_if(off.begin(), off.end(), [&](double d) { return d > limit; });
     const double worst = *std::max_element(off.begin(), off.end());
     return refused("{} of {} positions do not follow the joints, by up to {}; read {} all but {} would fit to {}", bad,
-                   off.size(), mm(worst), one.name, left, mm(reading::median(then)))
+                   off.size(), mm(worst), one.name, left, mm(median(then)))
         .of(one.columns)
         .at_row(table_.from[static_cast<std::size_t>(first - off.begin())]->row)
         .beyond(to_mm(worst), to_mm(limit))
@@ -303,7 +304,7 @@ std::optional<Error> Look::of_sigma() const {
   if (table_.size() < kFewestForSigma) return std::nullopt;
   std::vector<double> stated;
   for (const Measurement* m : table_.from) stated.push_back(m->sigma.value_or(cell_.tracker.sigma));
-  const double sigma = reading::median(stated);
+  const double sigma = median(stated);
   if (sigma < kHarmless || given_->off > kNotThatGood * sigma) return std::nullopt;
   return refused("the positions follow the joints to {}, and are said to be uncertain by {}", mm(given_->off),
                  mm(sigma))

@@ -4,7 +4,6 @@
 #include <map>
 #include <string>
 
-#include "server/base/median.h"
 
 namespace trammel::reading {
 

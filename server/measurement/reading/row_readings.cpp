@@ -7,6 +7,8 @@
 #include <optional>
 #include <utility>
 
+#include "server/base/median.h"
+
 #include "server/measurement/reading/catalogue.h"
 
 namespace trammel::reading {
