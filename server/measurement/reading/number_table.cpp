@@ -4,7 +4,6 @@
 #include <map>
 #include <string>
 
-
 namespace trammel::reading {
 
 NumberTable table_of(const MeasurementBatch& batch) {

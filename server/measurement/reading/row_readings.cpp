@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "server/base/median.h"
-
 #include "server/measurement/reading/catalogue.h"
 
 namespace trammel::reading {
