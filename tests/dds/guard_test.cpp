@@ -936,7 +936,7 @@ TEST(Guard, WhoLeavesMakesRoom) {
 
 TEST(Guard, TheEndpointsOfAParticipantAreCountedAndOneTooManyIsSkipped) {
   constexpr std::size_t kMost = 5;
-  Guard guard(kMaxTextSample, nullptr, {}, false, kMost);
+  Guard guard(kMaxTextSample, nullptr, {}, Proof::kNone, kMost);
   const auto announced = [](std::uint32_t entity, const Prefix& of = kSource) {
     const ParameterList list = ParameterList().guid(0x005a, of, entity).text(0x0005, "Topic").text(0x0007, "Type");
     return Packet(of).data({0, kPublications, 7, {}, list.payload()}).bytes();
