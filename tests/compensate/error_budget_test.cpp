@@ -312,7 +312,7 @@ TEST(ErrorBudget, BetweenTwoModelsNamesWhatChangedFromOneToTheOther) {
   ASSERT_NE(unchanged, nullptr);
   EXPECT_LT(1e3 * unchanged->alone_rms, 0.2);
   const auto q4 = std::find_if(difference.parameters.begin(), difference.parameters.end(),
-                               [](const ParameterDifference& one) { return one.name == "q4"; });
+                               [](const ParameterDifference& each) { return each.name == "q4"; });
   ASSERT_NE(q4, difference.parameters.end());
   EXPECT_NEAR(q4->difference(), 0.4 * kDegree, 0.02 * kDegree);
   EXPECT_GT(std::abs(q4->difference()), q4->u95);
