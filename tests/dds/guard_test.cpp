@@ -476,6 +476,8 @@ TEST(Guard, WhereParticipantsProveWhoTheyAreEndpointsOfSecuritySayNothingInTheCl
   Guard open(kMaxTextSample), secured(kMaxTextSample, nullptr, {}, Proof::kOfIdentity);
   EXPECT_EQ(let_in(open, plain), plain);
   EXPECT_EQ(kinds(let_in(secured, plain)), std::vector<int>{kPad});
+  const PacketBytes liveliness = from().acknack(0xff0200c7, 0xff0200c2, 1, 0, 1).bytes();
+  EXPECT_EQ(let_in(secured, liveliness), liveliness) << "which the rules of plants do not protect";
   const PacketBytes wrapped = from()
                                   .submessage(kSecurePrefix, 1, PacketBytes(20))
                                   .heartbeat(0, kSecurePublications, 1000, 1000, 1)
