@@ -284,6 +284,43 @@ TEST_F(SecurityTest, ADatagramWithoutACertificateSendsNobodyAway) {
   }
 }
 
+// Without signatures our reader would skip the client's next thousand requests, and answer none of them.
+TEST_F(SecurityTest, ADatagramWithoutASignatureMakesNoReaderSkipWhatAClientAsks) {
+  daemon_.start();
+  test::RawClient<wire::ReadModels> client(daemon_.domain(), daemon_.port(), "of-cam", keys().of("cam", "cam-1"));
+  ASSERT_TRUE(client.wait_until_matched());
+  test::Prefix who{};
+  const auto octets = client.writer_octets();
+  std::copy_n(octets.begin(), who.size(), who.begin());
+  std::uint32_t writer = 0;
+  for (std::size_t i = who.size(); i < octets.size(); ++i) writer = writer << 8 | octets[i];
+  test::RawParticipant stranger(daemon_.port(), daemon_.domain());
+  stranger.set_prefix(who);
+  const test::PacketBytes no_key(20);
+  std::uint32_t count = 100'000;
+  // In the clear, and as if the message, or the submessage, were signed.
+  const auto pretend = [&](unsigned char begin, unsigned char end, std::int64_t skipped) {
+    test::Packet heartbeat(who), gap(who);
+    if (begin != 0) heartbeat.submessage(begin, 1, no_key);
+    if (begin != 0) gap.submessage(begin, 1, no_key);
+    heartbeat.heartbeat(0, writer, skipped, skipped, ++count);
+    gap.gap(0, writer, 1, skipped);
+    if (end != 0) heartbeat.submessage(end, 1, no_key);
+    if (end != 0) gap.submessage(end, 1, no_key);
+    stranger.send(heartbeat.bytes());
+    stranger.send(gap.bytes());
+  };
+  wire::ReadModelsRequest request;
+  request.what(wire::READ_MODELS);
+  request.about().cell("cell-7");
+  for (std::int64_t number = 1; number <= 10; ++number) {
+    for (const auto& [begin, end] : {std::pair<unsigned char, unsigned char>{0, 0}, {0x33, 0x34}, {0x31, 0x32}})
+      pretend(begin, end, 1000 + number);
+    client.send(request, number);
+    ASSERT_GE(client.wait_for_replies(static_cast<std::size_t>(number)).size(), static_cast<std::size_t>(number));
+  }
+}
+
 TEST_F(SecurityTest, WhatIsWrongWithAFolderIsSaidBeforeAnythingIsSent) {
   const std::string good = keys().of("cam", "cam-1");
   const auto spoiled = [&](const std::string& name, const std::function<void(const std::string& folder)>& spoil) {
