@@ -66,7 +66,9 @@ TEST_F(SharedHistory, AModelThatIsJudgedWhileOthersDecideAllTheTimeIsTriedAgainA
   bool changes = true;
   const Judging judging = [&](const Opponents&) -> Result<GateVerdict> {
     const int now = demand(other->version_in_force("cell-7")).value_or(0);
-    if (changes) EXPECT_TRUE(other->activate("cell-7", now == 2 ? 3 : 2));
+    if (changes) {
+      EXPECT_TRUE(other->activate("cell-7", now == 2 ? 3 : 2));
+    }
     return GateVerdict{true, "better"};
   };
   const auto refused = history.keep({made, asked}, judging);
