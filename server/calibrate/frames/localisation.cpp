@@ -12,6 +12,7 @@ namespace {
 constexpr double kLeastTurning = 1e-4;    // rad²: the nominal chain is itself some 10 mrad off
 constexpr int kMostAlternations = 10000;  // nearly flat valleys take thousands; each costs microseconds
 constexpr double kLastStep = 1e-9;        // m
+constexpr double kOnePoint = 1e-7;        // m: positions that are told to be the same, not measured to be
 
 /// The point t with R_i t ~ difference_i for all poses: the mean of R_iᵀ difference_i.
 Vector3 mean_point(const Eigen::Matrix3Xd& p_W, const std::vector<Pose>& X_WF) {
@@ -125,6 +126,10 @@ Result<BaseAndTool> locate_base_and_tool_point(const Eigen::Matrix3Xd& p_W, cons
   if (!(turning > kLeastTurning))
     return refused("base and tool: the flange turns too little to tell the tool from the base");
   BaseAndTool found;
+  if ((p_W.colwise() - p_W.rowwise().mean()).colwise().norm().maxCoeff() < kOnePoint) {
+    solve_point(p_W, X_BF, mean_R, found);  // any turn of the base about the point fits alike: none is taken
+    return found;
+  }
   Eigen::Matrix3Xd p_B(3, p_W.cols());
   for (int round = 0; round < kMostAlternations; ++round) {
     for (std::size_t i = 0; i < X_BF.size(); ++i) p_B.col(static_cast<int>(i)) = X_BF[i] * found.X_FT.translation();

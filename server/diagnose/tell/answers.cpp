@@ -162,7 +162,13 @@ void tell_findings(const Explained& explained, const PreparedBatch& prepared, co
                                    {remainder.more_than_noise, left, remainder.larger});
   std::vector<SuspectedPose> out;
   for (const Accepted& one : found.accepted) {
-    if (one.is_outlier()) out.push_back(one.pose);
+    if (!one.is_outlier()) continue;
+    out.push_back(one.pose);
+    const bool is_in_doubt =
+        std::any_of(diagnosis.findings.begin(), diagnosis.findings.end(), [&](const Finding& finding) {
+          return finding.cause.pose_id == one.cause.pose_id && finding.source.empty() && !finding.could_also_be.empty();
+        });
+    if (is_in_doubt) out.back().reason = "what the simulation lacks may be largest there: repeat it and its neighbours";
   }
   diagnosis.suspects.insert(diagnosis.suspects.begin(), out.begin(), out.end());
 }
