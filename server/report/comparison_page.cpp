@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "server/base/shown_value.h"
 #include "server/base/units.h"
@@ -15,12 +16,23 @@ namespace trammel {
 
 namespace {
 
+constexpr double kWorthARow = 1e-3;  // of the difference
+
+/// A paragraph for each line of a text.
+std::string paragraphs(const std::string& text) {
+  std::string html;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) html += "<p>" + html_text(line) + "</p>";
+  return html;
+}
+
 std::string lines_table(const BudgetView& view) {
   double longest = 0;
   for (const BudgetLine& line : view.lines) longest = std::max(longest, line.alone_rms);
   std::vector<HtmlRow> rows;
   for (const BudgetLine& line : view.lines) {
-    if (line.alone_rms <= 0) continue;
+    const bool within = !line.value || std::abs(line.value->value) <= line.value->u95;
+    if (std::abs(line.share) < kWorthARow && within) continue;
     const std::string value =
         line.value
             ? fmt::format("{} ± {} {}", show_read(line.value->value, line.value->u95, {1, line.value->unit}).value,
@@ -32,6 +44,7 @@ std::string lines_table(const BudgetView& view) {
                          fmt::format("{:.4f}", to_mm(line.alone_rms)),
                      fmt::format("{:.1f} %", 100 * line.share)}});
   }
+  if (rows.empty()) return "<p>Nothing changed by more than its uncertainty.</p>";
   return html_table({"budget stacks", {"line", "change ± U (k = 2)", "alone, mm rms", "share"}, rows});
 }
 
@@ -55,7 +68,7 @@ std::string comparison_page(const Comparison& asked) {
        .title = fmt::format("Cell {}: what changed between two models", asked.now.cell().name),
        .subtitle = fmt::format("A: model {} · B: model {} · {}", asked.before.provenance().id,
                                asked.now.provenance().id, asked.where),
-       .body = html_section("In words", "<pre>" + html_text(asked.text) + "</pre>") +
+       .body = html_section("In words", paragraphs(asked.text)) +
                html_section("Beyond what touching base and tool frames would take away",
                             lines_table(found.budget.beyond_frames)) +
                html_section("As it stands", lines_table(found.budget.as_it_stands)) +
