@@ -133,11 +133,14 @@ std::string text_of(const Compared& all, const CompensatedModel& before, const C
   if (all.learned > 0)
     text += fmt::format("note: {} of the {} poses do not judge the models, because one was trained on them\n",
                         all.learned, all.poses.size());
-  if (all.judged)
-    text += fmt::format("on these poses: {}\nmodel {}:\n{}model {}:\n{}", to_string(all.judged->gain),
-                        before.provenance().id, evaluation_table(all.judged->before), now.provenance().id,
-                        evaluation_table(all.judged->now));
+  if (all.judged) text += fmt::format("on these poses: {}\n", to_string(all.judged->gain));
   return text;
+}
+
+std::string tables_of(const Compared& all, const CompensatedModel& before, const CompensatedModel& now) {
+  if (!all.judged) return "";
+  return fmt::format("model {}:\n{}model {}:\n{}", before.provenance().id, evaluation_table(all.judged->before),
+                     now.provenance().id, evaluation_table(all.judged->now));
 }
 
 ordered_json model_of(const CompensatedModel& model) {
@@ -206,7 +209,7 @@ Status compare(const CompareArguments& arguments) {
   const Compared all = TRY(compared(before, now, arguments));
   warn_of_notes(notes_of(now));
   const std::string text = text_of(all, before, now);
-  tell(text, {arguments.report, arguments.json});
+  tell(text + tables_of(all, before, now), {arguments.report, arguments.json});
   if (!arguments.report.empty())
     outputs.put("--report",
                 with_pages_beside(comparison_page({before, now, all.difference, all.where, text}), arguments.report));
