@@ -173,8 +173,9 @@ TEST_F(Compare, APredictedProgramHasTheNotesOfItsModelAsCodes) {
   ASSERT_EQ(trammel({"predict", TRAMMEL_SOURCE_DIR "/config/programs/drill.mod", "--model", file("now.model"), "-o",
                      file("p.csv"), "--json", file("p.json")}),
             0);
+  const json told = json_in("p.json");
   std::vector<std::string> codes;
-  for (const json& note : json_in("p.json").at("notes")) codes.push_back(note.at("code"));
+  for (const json& note : told.at("notes")) codes.push_back(note.at("code"));
   EXPECT_NE(std::find(codes.begin(), codes.end(), "robot_not_confirmed"), codes.end());
 }
 

@@ -142,13 +142,14 @@ TEST(Approach, ABidirectionalPlanHasEveryPoseTwice) {
 
 TEST(Approach, OneWayComesFromBelowAlways) {
   const auto cell = test::cell_7();
-  PlanOptions options{40, 7};
+  PlanOptions options{12, 7};
   options.one_way = true;
-  for (const PlannedPose& pose : make_plan(cell, options).value().poses)
-    EXPECT_EQ(pose.context.direction, Sides(6, 1)) << pose.id;
-  options.criterion = PlanCriterion::kObservability;
-  for (const PlannedPose& pose : make_plan(cell, options).value().poses)
-    EXPECT_EQ(pose.context.direction, Sides(6, 1)) << pose.id;
+  for (const PlanCriterion criterion : {PlanCriterion::kLatinHypercube, PlanCriterion::kObservability}) {
+    options.criterion = criterion;
+    const Plan plan = make_plan(cell, options).value();
+    ASSERT_EQ(plan.poses.size(), 12u);
+    for (const PlannedPose& pose : plan.poses) EXPECT_EQ(pose.context.direction, Sides(6, 1)) << pose.id;
+  }
   options.bidirectional = true;
   EXPECT_EQ(make_plan(cell, options).error().code, ErrorCode::kUsage);
 }

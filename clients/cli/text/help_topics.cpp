@@ -125,7 +125,7 @@ constexpr std::pair<std::string_view, std::string_view> kExamples[] = {
      "  trammel diagnose --cell cell.yaml --batch batch.csv --report page.html\n"
      "  trammel diagnose --cell cell.yaml --batch b.csv --next-poses next.csv"},
     {"remedies", "  trammel remedies --model cell.model -o remedies.html"},
-    {"compare", "  trammel compare before.model after.model --batch fresh.csv --report compared.html"},
+    {"compare", "  trammel compare a.model b.model --batch fresh.csv --report page.html"},
     {"study", "  trammel study drilling --json -"},
     {"fleet", "  trammel fleet --model a.model --model b.model --model c.model"},
     {"import-backup",
