@@ -10,6 +10,7 @@
 #include "server/calibrate/identify/weighting.h"
 #include "server/calibrate/sessions/session_setting.h"
 #include "server/error_sources/catalogue.h"
+#include "server/measurement/gauges.h"
 #include "server/measurement/sessions.h"
 
 namespace trammel {
@@ -80,10 +81,10 @@ class RowSearch {
     begin_at(fitted(frames(), few));
     if (!found) begin_at(placed_by_few(few));
     if (!found) return led_to_by_frames(few);
-    if (left(*found) > kMuchLess * before) return all;
-    const std::optional<Readmitted> settled = readmitted(std::move(*found), sources_);
-    if (!settled || left(settled->found) > kMuchLess * before) return all;
-    return enough(settled->rows);
+    const std::optional<Readmitted> settled =
+        left(*found) > kMuchLess * before ? std::nullopt : readmitted(std::move(*found), sources_);
+    if (settled && left(settled->found) <= kMuchLess * before) return enough(settled->rows);
+    return has_gauges(batch_) ? led_to_by_frames(few) : all;
   }
 
  private:

@@ -11,6 +11,7 @@
 #include "server/calibrate/calibrate.h"
 #include "server/calibrate/frames/frames.h"
 #include "server/calibrate/identify/weighting.h"
+#include "server/error_sources/catalogue.h"
 #include "server/measurement/reading_units.h"
 
 namespace trammel {
@@ -39,9 +40,9 @@ double median_size(const Eigen::VectorXd& values) {
   return *middle;
 }
 
-/// m, by what each distance is off that of the arm as drawn; empty where it leads to none of them.
+/// m, by what each distance is off that of the arm as drawn, its base where they put it; empty where it leads to none.
 std::optional<Eigen::VectorXd> off_drawing(const CellPtr& cell, const MeasurementBatch& distances) {
-  const auto found = calibrate(cell, {}, distances, {});
+  const auto found = calibrate(cell, {std::string(cause_correcting(causes::Part::kBase).spelling)}, distances, {});
   if (!found) return std::nullopt;
   return residuals_of(found->model, distances, found->model.values).gauge;
 }
