@@ -3,7 +3,8 @@
 #include <cstddef>
 #include <string>
 
-#include "clients/cli/files/program_files.h"
+#include "clients/cli/files/files_of_program.h"
+#include "server/base/result.h"
 
 /// What a controller keeps beside its programs.
 namespace trammel::cli {

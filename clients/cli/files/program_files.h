@@ -1,29 +1,14 @@
 #pragma once
 
-#include <map>
-#include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
 #include "clients/cam/dialect.h"
+#include "clients/cli/files/files_of_program.h"
 #include "server/base/result.h"
 
 /// The files of one program: read from files, folders or standard input, written with what they were before.
 namespace trammel::cli {
-
-struct ProgramFiles {
-  cam::Dialect dialect = cam::Dialect::kRapid;
-  std::vector<cam::SourceFile> files;
-  std::vector<std::string> paths;  ///< of each file; `-` is standard input
-  bool from_folder = false;        ///< the output is a folder too
-  std::set<std::string> system =
-      {};  ///< names of files that belong to the controller and were found in a folder: read, not written
-  std::vector<cam::SourceFile> parameters = {};  ///< MOC.cfg of an ABB backup that a folder is
-  std::string task = {};                         ///< of RAPID, whose modules were taken; empty: of all
-  std::vector<cam::SourceFile> beside = {};      ///< read for values alone: other tasks, lists of frames and tools
-  std::vector<std::string> not_read = {};        ///< what speaks of the robot and is not read: a sentence each
-};
 
 /// Whether the inputs are a robot program. Otherwise they are one table of targets (.csv).
 [[nodiscard]] bool is_program(const std::vector<std::string>& inputs, const std::string& format);

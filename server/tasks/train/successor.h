@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "server/registry/model_registry.h"
+#include "server/compensate/served_model.h"
 #include "server/tasks/train/train.h"
 
 namespace trammel {
