@@ -295,16 +295,21 @@ TEST_F(SecurityTest, ADatagramWithoutASignatureMakesNoReaderSkipWhatAClientAsks)
   std::uint32_t writer = 0;
   for (std::size_t i = who.size(); i < octets.size(); ++i) writer = writer << 8 | octets[i];
   test::RawParticipant stranger(daemon_.port(), daemon_.domain());
+  ASSERT_TRUE(stranger.meet(kLimit)) << "it learns where samples are read";
   stranger.set_prefix(who);
   const test::PacketBytes no_key(20);
   std::uint32_t count = 100'000;
+  constexpr std::uint32_t kReaders = 64, kReaderKind = 0x04;  // the service's readers are among these
   // In the clear, and as if the message, or the submessage, were signed.
   const auto pretend = [&](unsigned char begin, unsigned char end, std::int64_t skipped) {
     test::Packet heartbeat(who), gap(who);
     if (begin != 0) heartbeat.submessage(begin, 1, no_key);
     if (begin != 0) gap.submessage(begin, 1, no_key);
-    heartbeat.heartbeat(0, writer, skipped, skipped, ++count);
-    gap.gap(0, writer, 1, skipped);
+    ++count;
+    for (std::uint32_t reader = 1; reader <= kReaders; ++reader) {
+      heartbeat.heartbeat(reader << 8 | kReaderKind, writer, skipped, skipped, count);
+      gap.gap(reader << 8 | kReaderKind, writer, 1, skipped);
+    }
     if (end != 0) heartbeat.submessage(end, 1, no_key);
     if (end != 0) gap.submessage(end, 1, no_key);
     stranger.send(heartbeat.bytes());
