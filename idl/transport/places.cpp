@@ -171,7 +171,8 @@ Result<std::vector<HostPort>> look_for_places(const std::vector<HostPort>& disco
   const auto address = TRY(own_address_towards(discovery_servers.front().address));
   FoundPlaces found(domain, !address.starts_with("127."));
   Looker looker(found);
-  TRY(client_of(discovery_servers, address, rtps::DiscoveryProtocol_t::SUPER_CLIENT, {}, &looker));
+  const auto participant =
+      TRY(client_of(discovery_servers, address, rtps::DiscoveryProtocol_t::SUPER_CLIENT, {}, &looker));
   std::vector<HostPort> places = found.wait(limit);
   if (!places.empty()) return places;
   std::vector<std::string> asked;
