@@ -151,8 +151,7 @@ std::string way_to_the_tool(const PhysicalModel& model, const MeasurementBatch& 
   constexpr const char* kHow =
       "write x_mm, y_mm and z_mm, all 0, in each such row in place of touch_mm or distance_mm and anchor_id (the point "
       "is then the origin of the batch's frame), and base: null in the cell file: the tool is found from how the "
-      "flange "
-      "turns about the point; how the base is turned about it stays unknown";
+      "flange turns about the point (trammel export-robot writes it); how the base is turned about it stays unknown";
   if (is_about_one_point(model, batch)) return fmt::format("the tool's point is at one place in all rows: {}", kHow);
   return fmt::format(
       "write where it sits to some mm, or measure some positions; or let its point touch one point in ten orientations "
