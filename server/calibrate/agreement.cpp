@@ -23,7 +23,6 @@ constexpr double kAsked = 3;        // times the stated sigma: the least that a 
 constexpr double kKept = 0.55;      // share of the rows that are fitted: with two bad ones in five, some are spared
 constexpr double kAgreeing = 0.6;   // share that must agree at the end
 constexpr double kMuchLess = 0.25;  // of what was left
-constexpr double kSurelyFar = 2;    // times as far off as a suspect, beside what the drawing leaves
 constexpr double kEquations = 1.5;  // for each parameter, of the rows that are fitted
 constexpr std::size_t kMostRows = 300;  // evenly drawn beyond, while rows are looked for
 constexpr int kMostSteps = 12;
@@ -177,12 +176,12 @@ class RowSearch {
     return start;
   }
 
-  /// The rows that are no farther off than so many times a good one may be.
-  [[nodiscard]] Rows within(double limit, const CalibrationResult& found) const {
+  /// The rows that are no farther off than a good one may be.
+  [[nodiscard]] Rows near(const CalibrationResult& found) const {
     const Eigen::VectorXd off = farness(found, batch_);
     Rows rows;
     for (Eigen::Index i = 0; i < off.size(); ++i)
-      if (off(i) <= limit) rows.push_back(static_cast<std::size_t>(i));
+      if (off(i) <= 1) rows.push_back(static_cast<std::size_t>(i));
     return rows;
   }
 
@@ -195,7 +194,7 @@ class RowSearch {
                                                      const std::vector<std::string>& sources) const {
     Rows kept;
     for (int step = 0; step < kMostSteps; ++step) {
-      Rows next = within(1, found);
+      Rows next = near(found);
       if (next == kept) break;
       kept = std::move(next);
       auto again = fitted(sources, only(batch_, kept));
@@ -206,13 +205,13 @@ class RowSearch {
   }
 
   /// Of rows that are too few to find all sources on some of them, those that base and tool alone lead to: what is off
-  /// by twice as much as a suspect beside all that the drawing leaves does not agree.
+  /// by as much as a suspect beside all that the drawing leaves does not agree.
   [[nodiscard]] Rows led_to_by_frames(const MeasurementBatch& few) const {
     const std::vector<std::string> sources = frames();
     std::optional<CalibrationResult> found = concentrated(few, fitted(sources, few), sources);
     const std::optional<Readmitted> settled =
         found ? readmitted(std::move(*found), sources) : std::optional<Readmitted>();
-    return settled ? enough(within(kSurelyFar, settled->found)) : all_rows(batch_.measurements.size());
+    return settled ? enough(settled->rows) : all_rows(batch_.measurements.size());
   }
 
   /// `rows`; all, where they are too few to be right.

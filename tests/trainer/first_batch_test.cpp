@@ -77,20 +77,6 @@ TEST(FirstBatch, AModelThatLeavesHundredsOfSigmaWaitsForAPerson) {
   EXPECT_NE(job.outcome.why.find("times the stated sigma is left"), std::string::npos) << job.outcome.why;
 }
 
-TEST(FirstBatch, AGoodOneAfterOneWhoseModelWaitsForAPersonIsPutInForce) {
-  auto without_bias = std::make_shared<Cell>(*test::cell_7());
-  without_bias->model.bias = "none";
-  LearningCell cell(without_bias);
-  MeasurementBatch bent = measured(8);
-  for (Measurement& m : bent.measurements) {
-    const JointVector& q = m.context.q;
-    m.p_W += 2e-3 * Vector3(std::sin(7 * q(1)), std::cos(6 * q(2)), std::sin(8 * q(0)));
-  }
-  ASSERT_EQ(cell.submit(std::move(bent)).outcome.verdict, JobVerdict::kUndecided);
-  const JobProgress good = cell.submit(measured(9));
-  EXPECT_EQ(good.outcome.verdict, JobVerdict::kInForce) << good.what;
-}
-
 TEST(FirstBatch, ThreeBadRowsInTenAreNamedAndAPersonDecides) {
   auto without_bias = std::make_shared<Cell>(*test::cell_7());
   without_bias->model.bias = "none";
