@@ -18,7 +18,7 @@ namespace {
 
 using std::chrono::seconds;
 constexpr seconds kLimit{300};
-constexpr int kBatches = 8, kDecisions = 60;  // of each server
+constexpr int kBatches = 4, kDecisions = 16;  // of each server; a decision is judged first
 
 class PooledFleet : public testing::Test {
  protected:
