@@ -28,7 +28,7 @@ class CoupledPosterior {
 
   /// At the rows of `q`; `columns` is H there, not scaled, as in CoupledData. With kCompressed, training poses whose
   /// covariance with the target is too small to matter are left out. The variance of an output is then off by less than
-  /// 0.003 of its noise variance (bound: DECISIONS.md).
+  /// 0.003 of its noise variance (bound: decision 46).
   [[nodiscard]] std::vector<CoupledPrediction> predict(const Eigen::MatrixXd& q,
                                                        const std::vector<Eigen::MatrixXd>& columns) const;
   /// M x D: what the processes of the outputs add to H w.

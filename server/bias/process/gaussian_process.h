@@ -82,7 +82,7 @@ struct GpHyperparameters {
 enum class VarianceForm {
   /// From a few of its points, where few are enough: several times faster. At the data it is never below the exact
   /// variance, and above it by at most 0.001 σ_n². Elsewhere the standard deviation was measured to be at most 0.2 %
-  /// too small (bound: DECISIONS.md). Exact where many points would be needed.
+  /// too small (bound: decision 25). Exact where many points would be needed.
   kCompressed,
   /// What a model is served with. From the 24 or 48 points nearest to a target, where these say as much as all: mostly
   /// of a signal below the noise. Else from at most 400 points that stand for all. Else from all points, in single

@@ -18,7 +18,7 @@ using Eigen::VectorXd;
 constexpr Index kMostExact =
     5000;  // an exact process of so many takes 100 MB for each output, of twice as many four times that
 constexpr Index kMostOfAnExpert =
-    1200;  // neighbours: twice as many take twice the time and leave a tenth less (DECISIONS.md)
+    1200;  // neighbours: twice as many take twice the time and leave a tenth less (decision 28)
 constexpr double kKnownExactly = 1e-12;  // of the prior variance; keeps the precision at a training point finite
 
 VarianceForm form_of(VarianceForm wanted, std::size_t experts) {
