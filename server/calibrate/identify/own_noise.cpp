@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/base/median.h"
-
 namespace trammel {
 
 namespace {
@@ -15,7 +13,13 @@ constexpr double kBeyondChance = 4;           // standard deviations
 constexpr std::size_t kFewestPoses = 8;       // that tell how noisy a session is
 constexpr double kSettled = 0.02;             // relative
 
-/// Of two in the middle the lower one.
+/// The middle value; of two in the middle the lower one, so that of two sessions the quieter one is the usual one.
+double lower_median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>((values.size() - 1) / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 /// Squared residuals of one kind in units of their variance, and that variance itself, session by session.
 struct Squares {
   std::vector<std::vector<double>> ratio;
@@ -38,11 +42,11 @@ std::vector<double> beyond_others(const Squares& squares, double share) {
   std::vector<double> level(S, 0.0), beyond(S, 0.0), all;
   for (std::size_t s = 0; s < S; ++s) {
     if (squares.ratio[s].size() < kFewestPoses) continue;
-    level[s] = median(squares.ratio[s]) / (kMedianOfChiSquare * share);
+    level[s] = lower_median(squares.ratio[s]) / (kMedianOfChiSquare * share);
     all.insert(all.end(), squares.ratio[s].size(), level[s]);  // a large session tells more of what is usual
   }
   if (all.empty()) return beyond;
-  const double usual = median(all);
+  const double usual = lower_median(all);
   for (std::size_t s = 0; s < S; ++s) {
     const auto n = static_cast<double>(squares.ratio[s].size());
     if (level[s] <= usual * (1 + kBeyondChance * kSpreadOfMedian / std::sqrt(std::max(1.0, squares.poses[s]))))
