@@ -466,19 +466,24 @@ class Threads(unittest.TestCase):
             trammel.train(cell, batch, progress=lambda stage, share: os.kill(os.getpid(), signal.SIGINT))
 
 
-def own_ports(case):
-    """The first of eight ports that no other test has while this one lives (as tests/support/own_ports.cpp has it)."""
-    for tried in range(1500):
-        block = (os.getpid() + tried) % 1500
+def reserved(case, kind, count):
+    """A number that no other test has while this one lives (as tests/support/own_ports.cpp has it)."""
+    for tried in range(count):
+        number = (os.getpid() + tried) % count
         held = socket.socket(socket.AF_UNIX)
         try:
-            held.bind(f"\0trammel-test-ports-{block}")
+            held.bind(f"\0trammel-test-{kind}-{number + (kind == 'domain')}")
         except OSError:
             held.close()
             continue
         case.addClassCleanup(held.close)
-        return 20000 + 8 * block
-    raise RuntimeError("no ports are left for this test")
+        return number
+    raise RuntimeError(f"no {kind} is left for this test")
+
+
+def own_ports(case):
+    """The first of eight ports."""
+    return 20000 + 8 * reserved(case, "ports", 1500)
 
 
 class Service(unittest.TestCase):
@@ -490,7 +495,7 @@ class Service(unittest.TestCase):
         cls.addClassCleanup(folder.cleanup)
         cls.folder = pathlib.Path(folder.name)
         port = own_ports(cls)
-        domain = 1 + port // 8 % 48
+        domain = 1 + reserved(cls, "domain", 48)
         text = CELL.read_text().replace("../models", str(SOURCE / "models")).replace("bias: auto", "bias: none")
         (cls.folder / "cell-7.yaml").write_text(text)
         config = cls.folder / "server.yaml"
@@ -651,7 +656,7 @@ class Guards(unittest.TestCase):
         cls.addClassCleanup(folder.cleanup)
         cls.folder = pathlib.Path(folder.name)
         port = own_ports(cls)
-        domain = 1 + port // 8 % 48
+        domain = 1 + reserved(cls, "domain", 48)
         cls.path = cls.folder / "cell-7.yaml"
         cls.path.write_text(CELL.read_text().replace("../models", str(SOURCE / "models")).replace("bias: auto", "bias: none"))
         config = cls.folder / "server.yaml"

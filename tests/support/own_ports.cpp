@@ -16,13 +16,14 @@ namespace {
 
 constexpr int kBlocks = 1500;
 constexpr int kFirstPort = 20000;
+constexpr int kDomains = 48;  // the ports that DDS derives from them end below kFirstPort
 
-/// Whether this process has the block now: others see it by an abstract socket, which the kernel lets go with the
-/// process. tests/python/test_trammel.py uses the same names.
-bool reserve(int block) {
+/// Whether this process has the number of that kind now: others see it by an abstract socket, which the kernel lets go
+/// with the process. tests/python/test_trammel.py uses the same names.
+bool reserve(const char* kind, int number) {
   sockaddr_un name{};
   name.sun_family = AF_UNIX;
-  const std::string text = fmt::format("trammel-test-ports-{}", block);
+  const std::string text = fmt::format("trammel-test-{}-{}", kind, number);
   std::copy(text.begin(), text.end(), name.sun_path + 1);
   const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + text.size());
   const int held = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
@@ -55,7 +56,7 @@ bool are_free(int first) {
 int own_block() {
   for (int tried = 0; tried < kBlocks; ++tried) {
     const int block = (::getpid() + tried) % kBlocks;
-    if (reserve(block) && are_free(kFirstPort + kOwnPorts * block)) return block;
+    if (reserve("ports", block) && are_free(kFirstPort + kOwnPorts * block)) return block;
   }
   throw std::runtime_error("no ports are left for this test");
 }
@@ -65,9 +66,22 @@ int block() {
   return mine;
 }
 
+/// In one domain the port of a client that has left may be the next client's, whom a server then answers that still
+/// announces itself to the former one. Where more tests run at once than there are domains, two share one.
+int free_domain() {
+  for (int tried = 0; tried < kDomains; ++tried) {
+    const int domain = 1 + (block() + tried) % kDomains;
+    if (reserve("domain", domain)) return domain;
+  }
+  return 1 + block() % kDomains;
+}
+
 }  // namespace
 
 std::uint16_t own_ports() { return static_cast<std::uint16_t>(kFirstPort + kOwnPorts * block()); }
-std::uint32_t own_domain() { return 1 + static_cast<std::uint32_t>(block()) % 48; }
+std::uint32_t own_domain() {
+  static const int mine = free_domain();
+  return static_cast<std::uint32_t>(mine);
+}
 
 }  // namespace trammel::test
