@@ -16,12 +16,6 @@ namespace {
 
 constexpr double kWorthARow = 1e-3;  // of the error: shorter bars are not seen
 
-std::string value_of(const BudgetLine& line) {
-  if (!line.value) return "";
-  const ShownValue read = show_read(line.value->value, line.value->u95, {1, line.value->unit});
-  return fmt::format("{} ± {} {}", read.value, read.expanded, html_text(line.value->unit));
-}
-
 /// A bar as long as its part of the longest one, and its length in words.
 std::string bar(double length, double longest) {
   return bar_of(longest > 0 ? length / longest : 0, "budget_bar") + fmt::format("{:.4f}", to_mm(length));
@@ -44,7 +38,7 @@ std::map<std::string, double> shares_of(const BudgetView& view) {
 
 HtmlRow row_of(const BudgetLine& line, double longest, const std::map<std::string, double>& beyond_frames) {
   const auto beyond = beyond_frames.find(line.line);
-  return {{named(line), value_of(line), bar(line.alone_rms, longest), fmt::format("{:.1f} %", 100 * line.share),
+  return {{named(line), value_html(line), bar(line.alone_rms, longest), fmt::format("{:.1f} %", 100 * line.share),
            beyond == beyond_frames.end() ? "" : fmt::format("{:.1f} %", 100 * beyond->second),
            fmt::format("{:.4f}", to_mm(line.left_if_right)),
            line.times_usual ? fmt::format("{:.1f}", *line.times_usual) : "", html_text(line.action)},
@@ -52,6 +46,12 @@ HtmlRow row_of(const BudgetLine& line, double longest, const std::map<std::strin
 }
 
 }  // namespace
+
+std::string value_html(const BudgetLine& line) {
+  if (!line.value) return "";
+  const ShownValue read = show_read(line.value->value, line.value->u95, {1, line.value->unit});
+  return fmt::format("{} ± {} {}", read.value, read.expanded, html_text(line.value->unit));
+}
 
 std::string bar_of(double share, const char* kind) {
   return fmt::format(R"(<svg class="{}" viewBox="0 0 100 10" preserveAspectRatio="none" aria-hidden="true">)"

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <sstream>
 
-#include "server/base/shown_value.h"
 #include "server/base/units.h"
 #include "server/report/budget_page.h"
 #include "server/report/html.h"
@@ -33,13 +32,7 @@ std::string lines_table(const BudgetView& view) {
   for (const BudgetLine& line : view.lines) {
     const bool within = !line.value || std::abs(line.value->value) <= line.value->u95;
     if (std::abs(line.share) < kWorthARow && within) continue;
-    const std::string value =
-        line.value
-            ? fmt::format("{} ± {} {}", show_read(line.value->value, line.value->u95, {1, line.value->unit}).value,
-                          show_read(line.value->value, line.value->u95, {1, line.value->unit}).expanded,
-                          line.value->unit)
-            : "";
-    rows.push_back({{html_text(line.name), html_text(value),
+    rows.push_back({{html_text(line.name), value_html(line),
                      bar_of(longest > 0 ? line.alone_rms / longest : 0, "budget_bar") +
                          fmt::format("{:.4f}", to_mm(line.alone_rms)),
                      fmt::format("{:.1f} %", 100 * line.share)}});
